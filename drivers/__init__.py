@@ -1,0 +1,1 @@
+"""What touches hardware and time, and the records that every room shares."""

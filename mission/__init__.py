@@ -1,0 +1,1 @@
+"""What the flight does, and what may stop it."""

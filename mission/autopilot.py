@@ -1,0 +1,125 @@
+"""The autopilot as the mission sees it: a protocol and its records.
+
+World frame: NED, origin where the autopilot's local frame has it. Yaw: from north, clockwise positive, (-pi, pi].
+"""
+
+import enum
+from dataclasses import dataclass
+from typing import Protocol
+
+
+class FlightMode(enum.StrEnum):
+    """The flight modes that the mission tells apart; OTHER is any mode that only a pilot chooses."""
+
+    UNKNOWN = "unknown"
+    HOLD = "hold"
+    TAKEOFF = "takeoff"
+    OFFBOARD = "offboard"
+    RETURN = "return"
+    LAND = "land"
+    OTHER = "other"
+
+
+class LandedState(enum.StrEnum):
+    """MAVLink's MAV_LANDED_STATE."""
+
+    UNKNOWN = "unknown"
+    ON_GROUND = "on_ground"
+    TAKING_OFF = "taking_off"
+    IN_AIR = "in_air"
+    LANDING = "landing"
+
+
+@dataclass(frozen=True, slots=True)
+class Setpoint:
+    """An offboard position setpoint: NED [m] and yaw [rad] (MAVLink SET_POSITION_TARGET_LOCAL_NED)."""
+
+    north_m: float
+    east_m: float
+    down_m: float
+    yaw_rad: float
+
+
+@dataclass(frozen=True, slots=True)
+class VehicleState:
+    """The vehicle as telemetry tells it; `t_ns` is flight time when the newest position arrived.
+
+    Position NED [m], velocity NED [m/s], attitude [rad] (FRD body to NED), battery 0 to 1 (None: not known yet).
+    """
+
+    t_ns: int
+    north_m: float
+    east_m: float
+    down_m: float
+    v_north_m_s: float
+    v_east_m_s: float
+    v_down_m_s: float
+    roll_rad: float
+    pitch_rad: float
+    yaw_rad: float
+    mode: FlightMode
+    is_armed: bool
+    landed: LandedState
+    battery: float | None
+    is_connected: bool
+
+
+class AutopilotError(Exception):
+    """The autopilot refused or did not answer; the message is one sentence for a person."""
+
+
+class Autopilot(Protocol):
+    """A vehicle that flies offboard position setpoints.
+
+    Every coroutine has its own time limit and raises AutopilotError when the autopilot refuses or does not answer.
+    Commands return once the autopilot has accepted them; `state` tells when they have happened.
+    """
+
+    @property
+    def state(self) -> VehicleState | None:
+        """The newest telemetry; None until position, attitude, mode and landed state were all seen."""
+        ...
+
+    def drain_status_texts(self) -> list[str]:
+        """The autopilot's own words since the last call, oldest first."""
+        ...
+
+    async def connect(self) -> None:
+        """Find the autopilot and start its streams."""
+        ...
+
+    def missing_health(self) -> list[str]:
+        """What keeps the vehicle from arming, in words for a person; empty when it can arm."""
+        ...
+
+    async def arm(self) -> None:
+        """Arm the motors."""
+        ...
+
+    async def takeoff(self, altitude_m: float) -> None:
+        """Climb to `altitude_m` above the take-off point in the autopilot's own take-off mode."""
+        ...
+
+    async def start_offboard(self, setpoint: Setpoint) -> None:
+        """Send `setpoint` and switch to offboard; returns once the mode was read back."""
+        ...
+
+    async def set_setpoint(self, setpoint: Setpoint) -> None:
+        """Send the next offboard setpoint."""
+        ...
+
+    async def hold(self) -> None:
+        """Leave offboard and hold position in the autopilot's own mode."""
+        ...
+
+    async def return_home(self) -> None:
+        """Fly home and land in the autopilot's own mode (RTL)."""
+        ...
+
+    async def land(self) -> None:
+        """Land here in the autopilot's own mode."""
+        ...
+
+    async def close(self) -> None:
+        """Let go of the link. Never changes what the vehicle does."""
+        ...

@@ -1,0 +1,1 @@
+"""The flight log: written as the flight goes, read afterwards."""

@@ -1,0 +1,1 @@
+"""Frames in, estimates out: where the power line runs in an image."""

@@ -1,0 +1,82 @@
+"""What vision says about an image.
+
+Angles: from image up, clockwise positive, in (-pi/2, pi/2] (docs/conventions.md). A segment is x1, y1, x2, y2 [px],
+x right, y down, the centre of the first pixel at (0, 0).
+"""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Segments = NDArray[np.float64]
+"""(n, 4) float64 [px]: x1, y1, x2, y2 of each segment; read-only."""
+
+
+def wrap_line_angle_rad(angle_rad: float) -> float:
+    """Wrap a line's angle, whose period is pi, into (-pi/2, pi/2] [rad]."""
+    wrapped = math.fmod(angle_rad, math.pi)
+    if wrapped <= -math.pi / 2:
+        wrapped += math.pi
+    elif wrapped > math.pi / 2:
+        wrapped -= math.pi
+    return wrapped
+
+
+@dataclass(frozen=True, slots=True)
+class LineEstimate:
+    """The line group that one frame shows.
+
+    The group's middle line runs along d = (sin angle_rad, -cos angle_rad) and passes the image centre at `offset_px`
+    along its right-hand normal n = (cos angle_rad, sin angle_rad); so at angle 0 a positive offset is a line right of
+    the centre. `n_lines` counts the conductors taken, `confidence` is in [0, 1], `t_capture_ns` is the frame's.
+    """
+
+    angle_rad: float
+    offset_px: float
+    n_lines: int
+    confidence: float
+    t_capture_ns: int
+
+
+@dataclass(frozen=True, slots=True)
+class Detection:
+    """All that the pipeline found in one image; `angle_rad` and `offset_px` as in LineEstimate.
+
+    `angle_rad` is None where the image holds no segment at all. `is_present` says whether the histogram of oriented
+    segments passed the presence threshold ([Ceron] 6.1.3): only then do `power_lines` steer a vehicle.
+    """
+
+    segments: Segments
+    power_lines: Segments
+    angle_rad: float | None
+    offset_px: float
+    n_lines: int
+    confidence: float
+    is_present: bool
+
+    def estimate(self, t_capture_ns: int) -> LineEstimate | None:
+        """The estimate that guidance gets for a frame taken at `t_capture_ns`: None where no line is present."""
+        if not self.is_present or self.angle_rad is None:
+            return None
+        return LineEstimate(self.angle_rad, self.offset_px, self.n_lines, self.confidence, t_capture_ns)
+
+
+@dataclass(frozen=True, slots=True)
+class VisionReport:
+    """What the vision worker sends for each frame it worked on.
+
+    `estimate` is None where no line is present. `latency_ns` is flight time from capture to this record, `work_ns` the
+    pipeline's own time, `n_dropped` counts the camera's frames skipped since the last report. `power_lines` are kept
+    for the log. `jpeg` holds the frame for the frames that the log keeps, else None.
+    """
+
+    seq: int
+    t_capture_ns: int
+    estimate: LineEstimate | None
+    power_lines: Segments
+    latency_ns: int
+    work_ns: int
+    n_dropped: int
+    jpeg: bytes | None
