@@ -1,0 +1,86 @@
+"""What the executive tells the log about a flight. Times are flight time [ns] (drivers.clock)."""
+
+import enum
+from dataclasses import dataclass
+
+
+class Result(enum.StrEnum):
+    """How a task or a mission ended."""
+
+    COMPLETED = "completed"
+    TIMED_OUT = "timed_out"
+    FAILED = "failed"
+    INTERRUPTED = "interrupted"
+    TAKEN_OVER = "taken_over"
+
+
+class Severity(enum.StrEnum):
+    """How much an event matters to the person who reads it."""
+
+    INFO = "info"
+    WARNING = "warning"
+    ERROR = "error"
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Something that happened; `name` is one of the table in docs/safety.md, `reaction` what was done about it."""
+
+    t_ns: int
+    name: str
+    severity: Severity
+    message: str
+    reaction: str = "continue"
+
+
+@dataclass(frozen=True, slots=True)
+class TaskStarted:
+    """The executive entered the mission's task number `index` (from 0)."""
+
+    t_ns: int
+    index: int
+    task: str
+
+
+@dataclass(frozen=True, slots=True)
+class TaskEnded:
+    """The executive left a task; `reason` is a sentence."""
+
+    t_ns: int
+    index: int
+    task: str
+    result: Result
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class MissionEnded:
+    """The flight is over: the vehicle stands disarmed, or control was given up."""
+
+    t_ns: int
+    result: Result
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class TruePose:
+    """Where a simulated vehicle truly was: NED [m] from the world's origin, yaw [rad]."""
+
+    t_ns: int
+    north_m: float
+    east_m: float
+    down_m: float
+    yaw_rad: float
+
+
+@dataclass(frozen=True, slots=True)
+class TrueLine:
+    """The simulated world's power line: its centre line seen from above, and every conductor.
+
+    `axis_ne_m` is a polyline of (north, east) [m]; `conductors_ned_m` holds a polyline of (north, east, down) [m] for
+    each conductor; `supports_ned_m` the tops of the poles.
+    """
+
+    axis_ne_m: tuple[tuple[float, float], ...]
+    conductors_ned_m: tuple[tuple[tuple[float, float, float], ...], ...]
+    supports_ned_m: tuple[tuple[float, float, float], ...]
