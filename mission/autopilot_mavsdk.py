@@ -1,0 +1,222 @@
+"""The autopilot over MAVLink, by MAVSDK's native binding. The only file that imports mavsdk.
+
+What the binding does that its documentation does not say: setpoints are repeated by a C++ thread whatever our event
+loop does; `offboard.start()` may return although the autopilot refused, so the mode is read back from the heartbeat;
+and subscriptions must be cancelled before `destroy()`, or they hang for ever.
+"""
+
+import asyncio
+import math
+from collections.abc import AsyncIterator, Awaitable, Callable
+from typing import Any, TypeVar
+
+from mavsdk.asyncio import ComponentType, Configuration, Mavsdk, MavsdkConnectionError, MavsdkError
+from mavsdk.asyncio.plugins.action import ActionAsync
+from mavsdk.asyncio.plugins.offboard import OffboardAsync, PositionNedYaw
+from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
+from mavsdk.logging import log_subscribe
+from mavsdk.plugins.telemetry import FlightMode as MavsdkMode
+from mavsdk.plugins.telemetry import LandedState as MavsdkLanded
+
+from drivers.clock import Clock
+from mission.autopilot import AutopilotError, FlightMode, LandedState, Setpoint, VehicleState
+
+T = TypeVar("T")
+
+FIND_TIMEOUT_S = 20.0
+COMMAND_TIMEOUT_S = 5.0
+SETPOINT_TIMEOUT_S = 0.5
+_TELEMETRY_RATE_HZ = 50.0
+_BATTERY_RATE_HZ = 2.0
+
+_MODES = {
+    MavsdkMode.UNKNOWN: FlightMode.UNKNOWN,
+    MavsdkMode.READY: FlightMode.HOLD,
+    MavsdkMode.TAKEOFF: FlightMode.TAKEOFF,
+    MavsdkMode.HOLD: FlightMode.HOLD,
+    MavsdkMode.RETURN_TO_LAUNCH: FlightMode.RETURN,
+    MavsdkMode.LAND: FlightMode.LAND,
+    MavsdkMode.OFFBOARD: FlightMode.OFFBOARD,
+}
+_LANDED = {
+    MavsdkLanded.UNKNOWN: LandedState.UNKNOWN,
+    MavsdkLanded.ON_GROUND: LandedState.ON_GROUND,
+    MavsdkLanded.TAKING_OFF: LandedState.TAKING_OFF,
+    MavsdkLanded.IN_AIR: LandedState.IN_AIR,
+    MavsdkLanded.LANDING: LandedState.LANDING,
+}
+_HEALTH_WORDS = {
+    "is_gyrometer_calibration_ok": "gyroscope calibration",
+    "is_accelerometer_calibration_ok": "accelerometer calibration",
+    "is_magnetometer_calibration_ok": "compass calibration",
+    "is_local_position_ok": "local position estimate",
+    "is_global_position_ok": "global position (GPS)",
+    "is_home_position_ok": "home position",
+    "is_armable": "the autopilot's own arming checks",
+}
+
+
+class MavsdkAutopilot:
+    """A vehicle at a MAVSDK connection URL. See mission.autopilot.Autopilot for what the methods promise.
+
+    `on_log` gets MAVSDK's own log lines, which would otherwise go to the terminal in colour.
+    """
+
+    def __init__(self, connection: str, clock: Clock, on_log: Callable[[str], None]) -> None:
+        self._connection = connection
+        self._clock = clock
+        self._on_log = on_log
+        self._mavsdk: Mavsdk | None = None
+        self._action: Any = None
+        self._offboard: Any = None
+        self._subscriptions: list[asyncio.Task[None]] = []
+        self._newest: dict[str, Any] = {"connected": True, "battery": None}
+        self._position_ns = 0
+        self._status_texts: list[str] = []
+
+    @property
+    def state(self) -> VehicleState | None:
+        """The newest telemetry; None until position, attitude, mode and landed state were all seen."""
+        newest = self._newest
+        if any(key not in newest for key in ("position", "attitude", "mode", "landed", "armed")):
+            return None
+        position, velocity = newest["position"].position, newest["position"].velocity
+        attitude = newest["attitude"]
+        return VehicleState(
+            t_ns=self._position_ns,
+            north_m=position.north_m,
+            east_m=position.east_m,
+            down_m=position.down_m,
+            v_north_m_s=velocity.north_m_s,
+            v_east_m_s=velocity.east_m_s,
+            v_down_m_s=velocity.down_m_s,
+            roll_rad=math.radians(attitude.roll_deg),
+            pitch_rad=math.radians(attitude.pitch_deg),
+            yaw_rad=math.radians(attitude.yaw_deg),
+            mode=_MODES.get(newest["mode"], FlightMode.OTHER),
+            is_armed=newest["armed"],
+            landed=_LANDED.get(newest["landed"], LandedState.UNKNOWN),
+            battery=newest["battery"],
+            is_connected=newest["connected"],
+        )
+
+    def drain_status_texts(self) -> list[str]:
+        """The autopilot's own words since the last call, oldest first."""
+        texts, self._status_texts = self._status_texts, []
+        return texts
+
+    def missing_health(self) -> list[str]:
+        """What keeps the vehicle from arming, in words for a person; empty when it can arm."""
+        health = self._newest.get("health")
+        if health is None:
+            return ["health report"]
+        return [words for name, words in _HEALTH_WORDS.items() if not getattr(health, name)]
+
+    async def connect(self) -> None:
+        """Find the autopilot and start its streams."""
+        log_subscribe(self._take_log)
+        self._mavsdk = Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_STATION))
+        try:
+            await self._mavsdk.add_any_connection(self._connection)
+        except MavsdkConnectionError as error:
+            raise AutopilotError(
+                f"cannot open the connection {self._connection}: {error}; try udpin://0.0.0.0:14540"
+            ) from None
+        system = await self._mavsdk.first_autopilot(timeout_s=FIND_TIMEOUT_S)
+        if system is None:
+            raise AutopilotError(f"no autopilot was heard on {self._connection} within {FIND_TIMEOUT_S:g} s")
+        self._action = ActionAsync(system)
+        self._offboard = OffboardAsync(system)
+        telemetry = TelemetryAsync(system)
+        streams: list[tuple[AsyncIterator[Any], Callable[[Any], None]]] = [
+            (telemetry.subscribe_position_velocity_ned(), self._take_position),
+            (telemetry.subscribe_attitude_euler(), self._keep("attitude")),
+            (telemetry.subscribe_flight_mode(), self._keep("mode")),
+            (telemetry.subscribe_landed_state(), self._keep("landed")),
+            (telemetry.subscribe_armed(), self._keep("armed")),
+            (telemetry.subscribe_health(), self._keep("health")),
+            (telemetry.subscribe_battery(), self._take_battery),
+            (telemetry.subscribe_status_text(), self._take_status_text),
+            (system.is_connected_state(), self._keep("connected")),
+        ]
+        self._subscriptions = [asyncio.create_task(self._pump(stream, take)) for stream, take in streams]
+        await self._call("set the rate of positions", telemetry.set_rate_position_velocity_ned(_TELEMETRY_RATE_HZ))
+        await self._call("set the rate of attitudes", telemetry.set_rate_attitude_euler(_TELEMETRY_RATE_HZ))
+        await self._call("set the rate of battery reports", telemetry.set_rate_battery(_BATTERY_RATE_HZ))
+
+    async def arm(self) -> None:
+        """Arm the motors."""
+        await self._call("arm", self._action.arm())
+
+    async def takeoff(self, altitude_m: float) -> None:
+        """Climb to `altitude_m` above the take-off point in the autopilot's own take-off mode."""
+        await self._call("set the take-off altitude", self._action.set_takeoff_altitude(altitude_m))
+        await self._call("take off", self._action.takeoff())
+
+    async def start_offboard(self, setpoint: Setpoint) -> None:
+        """Send `setpoint` and ask for offboard. Whether the autopilot went there shows in `state.mode`."""
+        await self.set_setpoint(setpoint)
+        await self._call("start offboard control", self._offboard.start())
+
+    async def set_setpoint(self, setpoint: Setpoint) -> None:
+        """Send the next offboard setpoint."""
+        target = PositionNedYaw(setpoint.north_m, setpoint.east_m, setpoint.down_m, math.degrees(setpoint.yaw_rad))
+        await self._call("take a setpoint", self._offboard.set_position_ned(target), SETPOINT_TIMEOUT_S)
+
+    async def hold(self) -> None:
+        """Leave offboard and hold position in the autopilot's own mode."""
+        await self._call("hold", self._action.hold())
+
+    async def return_home(self) -> None:
+        """Fly home and land in the autopilot's own mode (RTL)."""
+        await self._call("return", self._action.return_to_launch())
+
+    async def land(self) -> None:
+        """Land here in the autopilot's own mode."""
+        await self._call("land", self._action.land())
+
+    async def close(self) -> None:
+        """Let go of the link. Never changes what the vehicle does."""
+        for subscription in self._subscriptions:
+            subscription.cancel()
+        await asyncio.gather(*self._subscriptions, return_exceptions=True)
+        self._subscriptions = []
+        if self._mavsdk is not None:
+            self._mavsdk.destroy()
+            self._mavsdk = None
+
+    async def _call(self, what: str, call: Awaitable[T], timeout_s: float = COMMAND_TIMEOUT_S) -> T:
+        """Await a call with its own time limit, and say its failure in words."""
+        try:
+            return await asyncio.wait_for(call, timeout_s)
+        except TimeoutError:
+            raise AutopilotError(f"the autopilot did not answer within {timeout_s:g} s when asked to {what}") from None
+        except MavsdkError as error:
+            result = getattr(error, "result", None)
+            words = str(getattr(result, "name", error)).replace("_", " ").lower()
+            raise AutopilotError(f"the autopilot refused to {what}: {words}") from None
+
+    async def _pump(self, stream: AsyncIterator[Any], take: Callable[[Any], None]) -> None:
+        async for item in stream:
+            take(item)
+
+    def _keep(self, key: str) -> Callable[[Any], None]:
+        def take(item: Any) -> None:
+            self._newest[key] = item
+
+        return take
+
+    def _take_position(self, item: Any) -> None:
+        self._newest["position"] = item
+        self._position_ns = self._clock.now_ns()
+
+    def _take_battery(self, item: Any) -> None:
+        percent = float(item.remaining_percent)
+        self._newest["battery"] = None if math.isnan(percent) else percent / 100
+
+    def _take_status_text(self, item: Any) -> None:
+        self._status_texts.append(str(item.text).strip())
+
+    def _take_log(self, level: Any, message: str, _file: str | None, _line: int) -> bool:
+        self._on_log(f"{level.name}: {message}")
+        return True

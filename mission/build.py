@@ -1,0 +1,108 @@
+"""From the plan that people write, in degrees, to the objects that fly, in radians."""
+
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+
+from drivers.camera.camera import Intrinsics
+from mission import plan as p
+from mission.guidance import GuidanceSettings
+from mission.safety import Hazard, Reaction, SafetyLimits
+from mission.tasks.align import AlignTask
+from mission.tasks.change_altitude import ChangeAltitudeTask
+from mission.tasks.follow_lines import FollowLinesTask
+from mission.tasks.go_down import GoDownTask
+from mission.tasks.hold import HoldTask
+from mission.tasks.move_forward import MoveForwardTask
+from mission.tasks.move_until import MoveUntilTask
+from mission.tasks.rotate import RotateTask
+from mission.tasks.takeoff import TakeoffTask
+from mission.tasks.task import Command, FlightMemory, Task
+from vision.pipeline import VisionSettings
+
+
+def guidance_settings(plan: p.GuidancePlan) -> GuidanceSettings:
+    """The guidance section in the program's units."""
+    return GuidanceSettings(
+        is_centred=plan.law == "centred",
+        r_m_s=plan.r_m_s,
+        P_per_s=plan.P_per_s,
+        epsilon_rad=math.radians(plan.epsilon_deg),
+        theta_0_rad=None if plan.theta_0_deg is None else math.radians(plan.theta_0_deg),
+        climb_m_s=plan.climb_m_s,
+        descend_m_s=plan.descend_m_s,
+        yaw_rate_rad_s=math.radians(plan.yaw_rate_deg_s),
+        lateral_per_s=plan.lateral_per_s,
+        lateral_max_m_s=plan.lateral_max_m_s,
+        height_over_line_m=plan.height_over_line_m,
+        leash_m=plan.leash_m,
+        arrival_m=plan.arrival_m,
+        max_estimate_age_s=plan.max_estimate_age_s,
+    )
+
+
+def safety_limits(plan: p.SafetyPlan) -> SafetyLimits:
+    """The safety section in the program's units."""
+    return SafetyLimits(
+        max_distance_m=plan.max_distance_m,
+        max_altitude_m=plan.max_altitude_m,
+        line_lost_s=plan.line_lost_s,
+        telemetry_stale_s=plan.telemetry_stale_s,
+        battery_low=plan.battery_low_percent / 100,
+        battery_critical=plan.battery_critical_percent / 100,
+    )
+
+
+def reactions(plan: p.SafetyPlan) -> Mapping[Hazard, Reaction]:
+    """The mission's reaction to each hazard that it may choose one for."""
+    return {Hazard(name): Reaction(value) for name, value in plan.reactions.model_dump().items()}
+
+
+def vision_settings(plan: p.VisionPlan) -> VisionSettings:
+    """The line finder's settings, with the plan's presence threshold."""
+    defaults = VisionSettings()
+    return replace(
+        defaults,
+        presence_min_length_share=defaults.presence_min_length_share * plan.presence_scale,
+        presence_min_reach=min(1.0, defaults.presence_min_reach * plan.presence_scale),
+    )
+
+
+def pinhole_intrinsics(camera: p.CameraPlan) -> Intrinsics:
+    """The undistorted camera of the plan: square pixels, the principal point in the middle."""
+    focal_px = camera.width_px / 2 / math.tan(math.radians(camera.hfov_deg) / 2)
+    return Intrinsics(
+        width_px=camera.width_px,
+        height_px=camera.height_px,
+        fx_px=focal_px,
+        fy_px=focal_px,
+        cx_px=(camera.width_px - 1) / 2,
+        cy_px=(camera.height_px - 1) / 2,
+    )
+
+
+def build_task(plan: p.AnyTask, guidance: GuidanceSettings, memory: FlightMemory) -> Task:
+    """The task in flight for a task of the plan, made when the flight reaches it."""
+    match plan:
+        case p.Takeoff():
+            return TakeoffTask(plan.altitude_m, guidance, memory)
+        case p.Ascend() | p.Descend():
+            return ChangeAltitudeTask(plan.altitude_m, guidance, memory)
+        case p.Rotate():
+            return RotateTask(math.radians(plan.angle_deg), guidance)
+        case p.MoveForward():
+            distance_m = None if plan.distance_m == "as_move_until" else float(plan.distance_m)
+            return MoveForwardTask(distance_m, guidance, memory)
+        case p.MoveUntil():
+            is_overhead = plan.until == "overhead"
+            return MoveUntilTask(plan.max_distance_m, plan.n_detections, guidance, memory, is_overhead=is_overhead)
+        case p.Align():
+            return AlignTask(plan.turn, plan.n_detections, guidance)
+        case p.FollowLines():
+            return FollowLinesTask(plan.distance_m, guidance)
+        case p.Hold():
+            return HoldTask(plan.duration_s)
+        case p.Return():
+            return GoDownTask(Command.RETURN)
+        case p.Land():
+            return GoDownTask(Command.LAND)

@@ -1,0 +1,271 @@
+"""The command line: the composition root. Heavy rooms are imported by the command that needs them.
+
+Exit codes: 0 done · 1 something could not be read or written · 2 bad input, nothing was connected · 3 not ready, the
+vehicle was never armed · 4 the mission ended early · 5 the pilot has the vehicle · 130 stopped by the operator.
+"""
+
+import asyncio
+import json
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, NoReturn
+
+import typer
+
+if TYPE_CHECKING:
+    from mission.flight import FlightOutcome, FlightSetup
+    from mission.log.summary import FlightReport
+    from mission.plan_file import MissionFile
+    from mission.simulation import Simulation
+
+EXIT_FAILED_FILE = 1
+EXIT_BAD_INPUT = 2
+EXIT_NOT_READY = 3
+EXIT_ENDED_EARLY = 4
+EXIT_TAKEN_OVER = 5
+EXIT_INTERRUPTED = 130
+
+app = typer.Typer(
+    help="Fly a multirotor along a power line by sight.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+MissionArgument = Annotated[Path, typer.Argument(help="The mission file (YAML); missions/ holds examples.")]
+SpeedOption = Annotated[float, typer.Option(min=0.1, max=20, help="Times faster than real time.")]
+SeedOption = Annotated[int, typer.Option(min=0, help="Seed of wind, sensors and image noise.")]
+WindOption = Annotated[float, typer.Option(min=0, max=20, help="Mean wind [m/s], with the gusts that belong to it.")]
+WorldOption = Annotated[str | None, typer.Option(help="A world's name or file; by default medium_voltage.")]
+LogOption = Annotated[Path, typer.Option(help="The folder for logs.")]
+JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON instead of tables.")]
+
+
+def main() -> None:
+    """Run the command line."""
+    app()
+
+
+@app.command("dry-run")
+def dry_run(
+    mission: MissionArgument,
+    speed: SpeedOption = 1.0,
+    seed: SeedOption = 1,
+    wind: WindOption = 0.0,
+    world: WorldOption = None,
+    log: LogOption = Path("logs"),
+    as_json: JsonOption = False,
+) -> None:
+    """Fly a mission with the simulated vehicle in a rendered world."""
+    mission_file = _read_mission(mission)
+    from drivers.clock import ScaledClock
+    from mission.flight import FlightSetup
+    from mission.simulation import Simulation, WorldError, true_line, world_path_or_name
+
+    clock = ScaledClock(speed, ScaledClock().now_ns())
+    try:
+        simulation = Simulation(world_path_or_name(world), clock, seed, wind)
+    except WorldError as error:
+        _fail(str(error), EXIT_BAD_INPUT)
+    with simulation:
+        setup = FlightSetup(
+            mission=mission_file,
+            connection=simulation.connection,
+            open_camera=simulation.camera_opener(mission_file.plan.camera),
+            clock=clock,
+            log_folder=log,
+            metadata={
+                "command": "dry-run",
+                "world": simulation.world.name,
+                "seed": str(seed),
+                "wind_m_s": f"{wind:g}",
+                "speed": f"{speed:g}",
+            },
+            true_line=true_line(simulation.world),
+            true_pose=simulation.true_pose,
+        )
+        outcome = _fly(setup)
+    _finish(outcome, as_json=as_json, simulation=simulation)
+
+
+@app.command()
+def run(
+    mission: MissionArgument,
+    connection: Annotated[
+        str | None, typer.Option(help="MAVSDK URL, e.g. serial:///dev/ttyAMA0:921600; else the mission's.")
+    ] = None,
+    camera: Annotated[
+        str | None, typer.Option(help="v4l2:DEVICE, file:PATH or sim:WORLD; else the mission's.")
+    ] = None,
+    log: LogOption = Path("logs"),
+    as_json: JsonOption = False,
+) -> None:
+    """Fly a mission with a real vehicle, PX4 SITL, or `lineflight sitl`."""
+    mission_file = _read_mission(mission)
+    plan = mission_file.plan
+    from mission.flight import FlightSetup
+    from mission.live_camera import CameraError, LiveCamera
+
+    try:
+        source = LiveCamera(camera or plan.camera.source, plan.camera)
+    except CameraError as error:
+        _fail(str(error), EXIT_BAD_INPUT)
+    with source:
+        setup = FlightSetup(
+            mission=mission_file,
+            connection=connection or plan.vehicle.connection,
+            open_camera=source.open_camera,
+            clock=source.clock,
+            log_folder=log,
+            metadata={"command": "run", "camera": camera or plan.camera.source},
+            feed_pose=source.feed_pose,
+        )
+        outcome = _fly(setup)
+    _finish(outcome, as_json=as_json, simulation=None)
+
+
+@app.command()
+def sitl(
+    world: WorldOption = None,
+    speed: SpeedOption = 1.0,
+    port: Annotated[int, typer.Option(min=1, max=65535, help="UDP port that the vehicle sends to.")] = 14540,
+    seed: SeedOption = 1,
+    wind: WindOption = 0.0,
+) -> None:
+    """Run only the simulated vehicle, until Ctrl-C; any MAVLink program can fly it."""
+    from mission.simulation import WorldError, serve_until_stopped, world_path_or_name
+
+    typer.echo(f"The simulated vehicle sends to udp 127.0.0.1:{port}; Ctrl-C ends it.", err=True)
+    try:
+        summary = serve_until_stopped(world_path_or_name(world), speed, port, seed, wind)
+    except (WorldError, OSError) as error:
+        _fail(str(error), EXIT_BAD_INPUT)
+    typer.echo(f"{summary.simulated_s:.1f} s flown in {summary.wall_s:.1f} s: {summary.achieved_speed:.2f} times", err=True)
+
+
+@app.command()
+def check(mission: MissionArgument) -> None:
+    """Validate a mission file, explain it, and estimate its flight."""
+    mission_file = _read_mission(mission)
+    from rich.console import Console
+
+    from mission.estimate import estimate_mission
+    from mission.explain import print_plan
+
+    print_plan(mission_file.plan, estimate_mission(mission_file.plan), Console())
+
+
+@app.command()
+def detect(
+    source: Annotated[Path, typer.Argument(metavar="IMAGE|FOLDER|VIDEO", help="What to look at.")],
+    as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object a line.")] = False,
+    draw: Annotated[Path | None, typer.Option(help="Draw the lines: a file for one image, else a folder.")] = None,
+) -> None:
+    """Find the power lines in photographs or a video."""
+    from mission.detect import DetectError, detect_all
+
+    try:
+        n_unreadable = detect_all(source, as_json=as_json, draw_to=draw)
+    except DetectError as error:
+        _fail(str(error), EXIT_BAD_INPUT)
+    if n_unreadable:
+        raise typer.Exit(EXIT_FAILED_FILE)
+
+
+@app.command()
+def inspect(log: Annotated[Path, typer.Argument(help="A flight log (.mcap).")], as_json: JsonOption = False) -> None:
+    """Say what happened in a flight."""
+    _print_report(_summarise(log), as_json=as_json)
+
+
+def _read_mission(path: Path) -> "MissionFile":
+    from mission.plan_file import MissionFileError, read_mission
+
+    try:
+        return read_mission(path)
+    except MissionFileError as error:
+        _fail("\n".join(error.lines()), EXIT_BAD_INPUT)
+
+
+def _fly(setup: "FlightSetup") -> "FlightOutcome":
+    from rich.console import Console
+
+    from mission.flight import fly
+    from mission.log.records import LogError
+    from mission.watch import Watch
+
+    try:
+        with Watch(setup.mission.plan, Console(stderr=True)) as watch:
+            return asyncio.run(fly(setup, watch.show))
+    except LogError as error:
+        _fail(str(error), EXIT_FAILED_FILE)
+
+
+def _finish(outcome: "FlightOutcome", *, as_json: bool, simulation: "Simulation | None") -> NoReturn:
+    """Print the report, draw the picture, and exit with the code that tells how it ended."""
+    from mission.log.summary import to_json
+
+    report = _summarise(outcome.log)
+    picture = _draw(outcome.log, report, simulation)
+    speed = None if simulation is None or simulation.summary is None else simulation.summary.achieved_speed
+    if as_json:
+        extra = {"log": str(outcome.log), "picture": None if picture is None else str(picture), "achieved_speed": speed}
+        typer.echo(json.dumps(to_json(report) | extra))
+    else:
+        _print_report(report, as_json=False)
+        typer.echo(f"log      {outcome.log}")
+        if picture is not None:
+            typer.echo(f"picture  {picture}")
+        if speed is not None:
+            typer.echo(f"speed    {speed:.2f} times real time")
+    if outcome.log_failure is not None:
+        typer.echo(outcome.log_failure, err=True)
+    raise typer.Exit(_exit_code(outcome))
+
+
+def _exit_code(outcome: "FlightOutcome") -> int:
+    from mission.records import Result
+
+    result = outcome.ended.result
+    if result is Result.FAILED and not outcome.has_armed:
+        return EXIT_NOT_READY
+    return {Result.COMPLETED: 0, Result.INTERRUPTED: EXIT_INTERRUPTED, Result.TAKEN_OVER: EXIT_TAKEN_OVER}.get(
+        result, EXIT_ENDED_EARLY
+    )
+
+
+def _draw(log: Path, report: "FlightReport", simulation: "Simulation | None") -> Path | None:
+    """The flight's picture, beside the log."""
+    from mission.flight_picture import write_picture
+
+    return write_picture(log, report, None if simulation is None else simulation.world)
+
+
+def _summarise(log: Path) -> "FlightReport":
+    from mission.log.reader import read_flight
+    from mission.log.records import LogError
+    from mission.log.summary import summarise
+
+    try:
+        return summarise(read_flight(log))
+    except LogError as error:
+        _fail(str(error), EXIT_BAD_INPUT)
+
+
+def _print_report(report: "FlightReport", *, as_json: bool) -> None:
+    from mission.log.summary import to_json
+
+    if as_json:
+        typer.echo(json.dumps(to_json(report)))
+        return
+    from rich.console import Console
+
+    from mission.log.report import print_report
+
+    print_report(report, Console())
+
+
+def _fail(message: str, code: int) -> NoReturn:
+    sys.stderr.write(message.rstrip() + "\n")
+    raise typer.Exit(code)

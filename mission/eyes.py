@@ -1,0 +1,102 @@
+"""What the executive asks of vision, and how a report is put on the map."""
+
+from collections import deque
+from typing import Protocol
+
+from drivers.camera.camera import Intrinsics
+from drivers.clock import NS_PER_S
+from mission.autopilot import VehicleState
+from mission.guidance import GuidanceSettings, locate_line, wrap_angle_rad
+from mission.tasks.task import Sight
+from vision.records import VisionReport
+
+
+class Eyes(Protocol):
+    """The source of vision reports: the vision worker, or a test's."""
+
+    @property
+    def failure(self) -> str | None:
+        """Why no more reports will come, in one sentence; None while all is well."""
+        ...
+
+    @property
+    def is_ready(self) -> bool:
+        """Whether the kernels are compiled and the camera gives frames."""
+        ...
+
+    def take(self) -> list[VisionReport]:
+        """The reports since the last call, oldest first."""
+        ...
+
+
+class StateHistory:
+    """The vehicle's states of the last seconds: a frame is matched with where the vehicle was when it was taken."""
+
+    def __init__(self, span_s: float = 2.0) -> None:
+        self._span_ns = round(span_s * NS_PER_S)
+        self._states: deque[VehicleState] = deque()
+
+    def add(self, state: VehicleState) -> None:
+        """Keep a state; one that is not newer than the last is ignored."""
+        if self._states and state.t_ns <= self._states[-1].t_ns:
+            return
+        self._states.append(state)
+        while self._states[0].t_ns < state.t_ns - self._span_ns:
+            self._states.popleft()
+
+    def at(self, t_ns: int) -> VehicleState | None:
+        """The state at a time, interpolated linearly; the nearest one outside the history. None while empty."""
+        if not self._states:
+            return None
+        later = None
+        for earlier in reversed(self._states):
+            if earlier.t_ns <= t_ns:
+                return earlier if later is None else _interpolate(earlier, later, t_ns)
+            later = earlier
+        return later
+
+
+def _interpolate(earlier: VehicleState, later: VehicleState, t_ns: int) -> VehicleState:
+    share = (t_ns - earlier.t_ns) / (later.t_ns - earlier.t_ns)
+
+    def between(a: float, b: float) -> float:
+        return a + share * (b - a)
+
+    def between_angles(a_rad: float, b_rad: float) -> float:
+        return wrap_angle_rad(a_rad + share * wrap_angle_rad(b_rad - a_rad))
+
+    return VehicleState(
+        t_ns=t_ns,
+        north_m=between(earlier.north_m, later.north_m),
+        east_m=between(earlier.east_m, later.east_m),
+        down_m=between(earlier.down_m, later.down_m),
+        v_north_m_s=between(earlier.v_north_m_s, later.v_north_m_s),
+        v_east_m_s=between(earlier.v_east_m_s, later.v_east_m_s),
+        v_down_m_s=between(earlier.v_down_m_s, later.v_down_m_s),
+        roll_rad=between_angles(earlier.roll_rad, later.roll_rad),
+        pitch_rad=between_angles(earlier.pitch_rad, later.pitch_rad),
+        yaw_rad=between_angles(earlier.yaw_rad, later.yaw_rad),
+        mode=later.mode,
+        is_armed=later.is_armed,
+        landed=later.landed,
+        battery=later.battery,
+        is_connected=later.is_connected,
+    )
+
+
+def sight_of(
+    report: VisionReport, history: StateHistory, camera: Intrinsics, guidance: GuidanceSettings, now_ns: int
+) -> Sight | None:
+    """What a report means on the map. None when it is too old to steer, or when nothing is known of that time.
+
+    This is the one place where the age of an estimate is judged.
+    """
+    if now_ns - report.t_capture_ns > guidance.max_estimate_age_s * NS_PER_S:
+        return None
+    state = history.at(report.t_capture_ns)
+    if state is None:
+        return None
+    line = None
+    if report.estimate is not None:
+        line = locate_line(report.estimate, state, camera, guidance.height_over_line_m)
+    return Sight(report.t_capture_ns, state.yaw_rad, report.estimate, line)

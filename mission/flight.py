@@ -1,0 +1,130 @@
+"""One flight put together: vision worker, autopilot, executive and recorder, from connecting to the closed log."""
+
+import asyncio
+import contextlib
+import signal
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from pathlib import Path
+
+from drivers.camera.camera import Camera
+from drivers.clock import ScaledClock
+from mission.autopilot import VehicleState
+from mission.autopilot_mavsdk import MavsdkAutopilot
+from mission.build import pinhole_intrinsics, vision_settings
+from mission.executive import Executive, Progress
+from mission.log.disk import log_path
+from mission.log.recorder import Recorder
+from mission.plan_file import MissionFile
+from mission.records import MissionEnded, TrueLine, TruePose
+from mission.worker_eyes import WorkerEyes
+from vision.worker import VisionWorker
+
+_PROGRESS_RATE_HZ = 5.0
+_TRUTH_RATE_HZ = 20.0
+_POSE_RATE_HZ = 100.0
+
+
+@dataclass(frozen=True, slots=True)
+class FlightSetup:
+    """What a flight is made of. `open_camera` is called in the vision worker.
+
+    `true_line` and `true_pose` are known for a simulated vehicle alone; `feed_pose` gets the telemetry where a camera is
+    simulated for a vehicle that flies elsewhere.
+    """
+
+    mission: MissionFile
+    connection: str
+    open_camera: Callable[[], Camera]
+    clock: ScaledClock
+    log_folder: Path
+    metadata: dict[str, str]
+    true_line: TrueLine | None = None
+    true_pose: Callable[[], TruePose | None] | None = None
+    feed_pose: Callable[[VehicleState], None] | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class FlightOutcome:
+    """How the flight ended, whether the vehicle was ever armed, and where its log is (and if it is whole)."""
+
+    ended: MissionEnded
+    has_armed: bool
+    log: Path
+    log_failure: str | None
+
+
+async def fly(setup: FlightSetup, on_progress: Callable[[Progress], None]) -> FlightOutcome:
+    """Fly the mission. SIGINT and SIGTERM end it by the mission's reaction, not by killing this process.
+
+    Raises LogError when the log cannot be made; then nothing was connected.
+    """
+    plan, clock = setup.mission.plan, setup.clock
+    path = log_path(setup.log_folder, plan.name, datetime.now(UTC))
+    with Recorder(
+        path, mission_text=setup.mission.text, mission_name=plan.name, metadata=setup.metadata, clock=clock
+    ) as recorder:
+        worker = VisionWorker(setup.open_camera, vision_settings(plan.vision), clock, plan.vision.log_rate_hz)
+        autopilot = MavsdkAutopilot(
+            setup.connection, clock, lambda text: recorder.record_status_text(clock.now_ns(), f"mavsdk {text}")
+        )
+        camera = pinhole_intrinsics(plan.camera)
+        executive = Executive(plan, autopilot, WorkerEyes(worker, clock), recorder, clock, camera)
+        if setup.true_line is not None:
+            recorder.record(setup.true_line)
+        worker.start()
+        with _stop_signals(executive.request_stop):
+            sides = [asyncio.create_task(_every(_PROGRESS_RATE_HZ, 1.0, lambda: on_progress(executive.progress)))]
+            if setup.true_pose is not None:
+                sides.append(asyncio.create_task(_record_truth(setup.true_pose, recorder, clock)))
+            if setup.feed_pose is not None:
+                sides.append(asyncio.create_task(_feed(setup.feed_pose, autopilot)))
+            try:
+                ended = await executive.run()
+            finally:
+                for side in sides:
+                    side.cancel()
+                await asyncio.gather(*sides, return_exceptions=True)
+                await autopilot.close()
+                worker.stop()
+        on_progress(executive.progress)
+    return FlightOutcome(ended, executive.has_armed, path, recorder.failure)
+
+
+async def _every(rate_hz: float, speed: float, act: Callable[[], None]) -> None:
+    while True:
+        act()
+        await asyncio.sleep(1.0 / (rate_hz * speed))
+
+
+async def _record_truth(true_pose: Callable[[], TruePose | None], recorder: Recorder, clock: ScaledClock) -> None:
+    def act() -> None:
+        pose = true_pose()
+        if pose is not None:
+            recorder.record(pose)
+
+    await _every(_TRUTH_RATE_HZ, clock.speed, act)
+
+
+async def _feed(feed_pose: Callable[[VehicleState], None], autopilot: MavsdkAutopilot) -> None:
+    def act() -> None:
+        state = autopilot.state
+        if state is not None:
+            feed_pose(state)
+
+    await _every(_POSE_RATE_HZ, 1.0, act)
+
+
+@contextlib.contextmanager
+def _stop_signals(stop: Callable[[], None]) -> Iterator[None]:
+    """Let Ctrl-C and a service manager's stop end the flight in order; again and again if pressed again."""
+    loop = asyncio.get_running_loop()
+    for number in (signal.SIGINT, signal.SIGTERM):
+        loop.add_signal_handler(number, stop)
+    try:
+        yield
+    finally:
+        for number in (signal.SIGINT, signal.SIGTERM):
+            loop.remove_signal_handler(number)
+

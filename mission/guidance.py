@@ -1,0 +1,176 @@
+"""Guidance: from an estimate and the vehicle's state to the next setpoint. Pure functions.
+
+Frames: NED world; the level frame has its origin in the camera, x forward along the vehicle's heading, y right, z down.
+Distances in the level frame are per metre of height over the line, because one camera cannot tell the height.
+"""
+
+import math
+from dataclasses import dataclass, replace
+
+from drivers.camera.camera import Intrinsics
+from mission.autopilot import Setpoint, VehicleState
+from vision.records import LineEstimate, wrap_line_angle_rad
+
+
+def wrap_angle_rad(angle_rad: float) -> float:
+    """Wrap an angle of period 2 pi into (-pi, pi] [rad]."""
+    wrapped = math.fmod(angle_rad, math.tau)
+    if wrapped <= -math.pi:
+        wrapped += math.tau
+    elif wrapped > math.pi:
+        wrapped -= math.tau
+    return wrapped
+
+
+def nearest_heading_rad(line_heading_rad: float, heading_rad: float) -> float:
+    """Of a line's two headings the one nearest to `heading_rad`, in (-pi, pi] [rad]."""
+    return wrap_angle_rad(heading_rad + wrap_line_angle_rad(line_heading_rad - heading_rad))
+
+
+@dataclass(frozen=True, slots=True)
+class GuidanceSettings:
+    """The plan's guidance section in the program's units; r, P, epsilon and theta_0 are [Ceron]'s.
+
+    `theta_0_rad` None: the yaw at the start.
+    """
+
+    is_centred: bool
+    r_m_s: float
+    P_per_s: float
+    epsilon_rad: float
+    theta_0_rad: float | None
+    climb_m_s: float
+    descend_m_s: float
+    yaw_rate_rad_s: float
+    lateral_per_s: float
+    lateral_max_m_s: float
+    height_over_line_m: float
+    leash_m: float
+    arrival_m: float
+    max_estimate_age_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class WorldLine:
+    """The line group on the map: its heading [rad] in (-pi, pi] (either of the two) and a point on it [m], NE."""
+
+    heading_rad: float
+    north_m: float
+    east_m: float
+
+    def offset_m(self, north_m: float, east_m: float, heading_rad: float) -> float:
+        """How far the line lies to the right of a point, for one who looks along `heading_rad` [m]."""
+        along = nearest_heading_rad(self.heading_rad, heading_rad)
+        return -math.sin(along) * (self.north_m - north_m) + math.cos(along) * (self.east_m - east_m)
+
+    def crossing_m(self, north_m: float, east_m: float, heading_rad: float) -> float | None:
+        """How far ahead a ray from the point along `heading_rad` crosses the line [m]; None within 20 degrees of it."""
+        sine = math.sin(self.heading_rad - heading_rad)
+        if abs(sine) < math.sin(math.radians(20.0)):
+            return None
+        d_north_m, d_east_m = self.north_m - north_m, self.east_m - east_m
+        return (d_north_m * math.sin(self.heading_rad) - d_east_m * math.cos(self.heading_rad)) / sine
+
+
+def locate_line(
+    estimate: LineEstimate, at_capture: VehicleState, camera: Intrinsics, height_over_line_m: float
+) -> WorldLine | None:
+    """Put the estimate's line on the map, undoing the vehicle's tilt.
+
+    The camera looks along the body's down axis, image up is the body's forward. Two points of the image line become
+    rays, are turned by roll and pitch into the level frame and meet the plane of the conductors there. `at_capture` is
+    the vehicle's state when the frame was taken, so that the delay of vision does not steer. None where a ray does not
+    look down (more than 80 degrees from it).
+    """
+    sine, cosine = math.sin(estimate.angle_rad), math.cos(estimate.angle_rad)
+    foot_px = (estimate.offset_px * cosine, estimate.offset_px * sine)  # along the right-hand normal, from the centre
+    reach_px = 0.25 * camera.height_px
+    points = []
+    for along_px in (-reach_px, reach_px):
+        u_px = foot_px[0] + along_px * sine + (camera.width_px - 1) / 2 - camera.cx_px
+        v_px = foot_px[1] - along_px * cosine + (camera.height_px - 1) / 2 - camera.cy_px
+        level = _level_from_body(
+            -v_px / camera.fy_px, u_px / camera.fx_px, 1.0, at_capture.roll_rad, at_capture.pitch_rad
+        )
+        if level[2] < math.cos(math.radians(80.0)) * math.hypot(*level):
+            return None
+        points.append((level[0] / level[2] * height_over_line_m, level[1] / level[2] * height_over_line_m))
+    (x0_m, y0_m), (x1_m, y1_m) = points
+    bearing_rad = math.atan2(y1_m - y0_m, x1_m - x0_m)
+    # The point of the line nearest to the vehicle, so that an error of the height moves it least.
+    offset_m = -math.sin(bearing_rad) * x0_m + math.cos(bearing_rad) * y0_m
+    near_x_m, near_y_m = -math.sin(bearing_rad) * offset_m, math.cos(bearing_rad) * offset_m
+    yaw_sine, yaw_cosine = math.sin(at_capture.yaw_rad), math.cos(at_capture.yaw_rad)
+    return WorldLine(
+        wrap_angle_rad(at_capture.yaw_rad + bearing_rad),
+        at_capture.north_m + yaw_cosine * near_x_m - yaw_sine * near_y_m,
+        at_capture.east_m + yaw_sine * near_x_m + yaw_cosine * near_y_m,
+    )
+
+
+def _level_from_body(
+    forward: float, right: float, down: float, roll_rad: float, pitch_rad: float
+) -> tuple[float, float, float]:
+    """Turn a body (FRD) vector into the level frame: R_y(pitch) R_x(roll)."""
+    y = math.cos(roll_rad) * right - math.sin(roll_rad) * down
+    z_rolled = math.sin(roll_rad) * right + math.cos(roll_rad) * down
+    x = math.cos(pitch_rad) * forward + math.sin(pitch_rad) * z_rolled
+    z = -math.sin(pitch_rad) * forward + math.cos(pitch_rad) * z_rolled
+    return x, y, z
+
+
+def turn_towards_rad(angle_rad: float, target_rad: float, gain_per_s: float, max_rad_s: float, dt_s: float) -> float:
+    """One step of `angle <- angle + error P` ([Ceron] Algorithm 6.2), P per second, at most `max_rad_s` [rad]."""
+    error_rad = wrap_angle_rad(target_rad - angle_rad)
+    share = 1.0 - math.exp(-gain_per_s * dt_s)  # the same turn whatever the control rate
+    return wrap_angle_rad(angle_rad + _clamp(error_rad * share, max_rad_s * dt_s))
+
+
+def step_along(reference: Setpoint, heading_rad: float, step_m: float) -> Setpoint:
+    """Go x <- x + r cos(theta), y <- y + r sin(theta) ([Ceron] Algorithms 6.1 and 6.3); yaw and height stay."""
+    return Setpoint(
+        reference.north_m + step_m * math.cos(heading_rad),
+        reference.east_m + step_m * math.sin(heading_rad),
+        reference.down_m,
+        reference.yaw_rad,
+    )
+
+
+def step_sideways(
+    reference: Setpoint, line: WorldLine, heading_rad: float, gain_per_s: float, max_m_s: float, dt_s: float
+) -> Setpoint:
+    """Move the reference towards the line, across `heading_rad`: a share of the offset per second, up to `max_m_s`."""
+    offset_m = line.offset_m(reference.north_m, reference.east_m, heading_rad)
+    share = 1.0 - math.exp(-gain_per_s * dt_s)
+    return step_along(reference, heading_rad + math.pi / 2, _clamp(offset_m * share, max_m_s * dt_s))
+
+
+def step_level_towards(reference: Setpoint, goal: Setpoint, max_m_s: float, dt_s: float) -> Setpoint:
+    """Move the reference's place on the map towards the goal's, at most `max_m_s`; yaw and height stay."""
+    north_m, east_m = goal.north_m - reference.north_m, goal.east_m - reference.east_m
+    distance_m = math.hypot(north_m, east_m)
+    share = min(1.0, max_m_s * dt_s / distance_m) if distance_m > 0.0 else 0.0
+    return replace(
+        reference, north_m=reference.north_m + share * north_m, east_m=reference.east_m + share * east_m
+    )
+
+
+def step_vertical(reference: Setpoint, down_m: float, max_m_s: float, dt_s: float) -> Setpoint:
+    """Move the reference's height towards `down_m`, at most `max_m_s`."""
+    step_m = _clamp(down_m - reference.down_m, max_m_s * dt_s)
+    return Setpoint(reference.north_m, reference.east_m, reference.down_m + step_m, reference.yaw_rad)
+
+
+def leash(reference: Setpoint, state: VehicleState, length_m: float) -> Setpoint:
+    """Keep the reference within `length_m` of the vehicle, level and vertically, so that it cannot run away."""
+    north_m, east_m = reference.north_m - state.north_m, reference.east_m - state.east_m
+    distance_m = math.hypot(north_m, east_m)
+    scale = min(1.0, length_m / distance_m) if distance_m > 0.0 else 1.0
+    down_m = _clamp(reference.down_m - state.down_m, length_m)
+    return Setpoint(
+        state.north_m + scale * north_m, state.east_m + scale * east_m, state.down_m + down_m, reference.yaw_rad
+    )
+
+
+def _clamp(value: float, limit: float) -> float:
+    return max(-limit, min(limit, value))

@@ -1,0 +1,55 @@
+"""The camera of a flight that is not a dry-run: a real one, a recording, or one simulated at the telemetry's pose."""
+
+import functools
+from collections.abc import Callable
+from types import TracebackType
+from typing import Self
+
+from drivers.camera.camera import Camera, CameraError, CameraSettings
+from drivers.camera.spec import open_camera
+from drivers.clock import ScaledClock
+from mission.autopilot import VehicleState
+from mission.plan import CameraPlan
+
+SIM_PREFIX = "sim:"
+
+
+class LiveCamera:
+    """What opens the camera of `source`, v4l2:DEVICE, file:PATH or sim:WORLD. A context manager.
+
+    Raises CameraError for a source that does not exist; WorldErrors are said as CameraError too. `feed_pose` must be
+    given the telemetry when it is not None.
+    """
+
+    def __init__(self, source: str, plan: CameraPlan) -> None:
+        self.clock = ScaledClock()
+        self.feed_pose: Callable[[VehicleState], None] | None = None
+        self._close: Callable[[], None] = lambda: None
+        self.open_camera: Callable[[], Camera]
+        if source.startswith(SIM_PREFIX):
+            self._hang_on_telemetry(source.removeprefix(SIM_PREFIX), plan)
+        else:
+            settings = CameraSettings(plan.width_px, plan.height_px, plan.rate_hz)
+            self.open_camera = functools.partial(open_camera, source, settings, self.clock)
+
+    def _hang_on_telemetry(self, world: str, plan: CameraPlan) -> None:
+        from mission.simulation import TelemetryCamera, WorldError, world_path_or_name
+
+        try:
+            camera = TelemetryCamera(world_path_or_name(world or None), self.clock, plan)
+        except WorldError as error:
+            raise CameraError(str(error)) from None
+        self._close = camera.close
+        self.feed_pose = camera.feed
+        self.open_camera = camera.open_camera
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._close()
+
+
+__all__ = ["CameraError", "LiveCamera"]

@@ -1,0 +1,225 @@
+"""The mission plan: what a mission file may say, with its defaults and limits.
+
+Every key carries its unit; angles are degrees here, because people write them (`MissionPlan` is the only place inside
+the program that keeps degrees). Names r, epsilon, P and theta_0 are [Ceron]'s, Algorithms 6.1 to 6.3.
+"""
+
+from typing import Annotated, Literal, get_args
+
+from pydantic import BaseModel, ConfigDict, Field
+
+Metres = Annotated[float, Field(gt=0, le=1000)]
+AltitudeM = Annotated[float, Field(ge=1, le=120)]
+TimeLimitS = Annotated[float, Field(gt=0, le=3600)]
+
+
+class _Section(BaseModel):
+    """Strict: a number in quotes or a misspelt key is an error, never a silent default."""
+
+    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
+
+
+class Takeoff(_Section):
+    """Arm and climb straight up in the autopilot's own take-off mode."""
+
+    task: Literal["takeoff"]
+    altitude_m: AltitudeM = Field(5.0, description="Height above the take-off point.")
+    time_limit_s: TimeLimitS = 60.0
+
+
+class Ascend(_Section):
+    """Climb straight up to a height above the take-off point."""
+
+    task: Literal["ascend"]
+    altitude_m: AltitudeM = Field(description="Height above the take-off point.")
+    time_limit_s: TimeLimitS = 90.0
+
+
+class Descend(_Section):
+    """Sink straight down to a height above the take-off point."""
+
+    task: Literal["descend"]
+    altitude_m: AltitudeM = Field(description="Height above the take-off point.")
+    time_limit_s: TimeLimitS = 90.0
+
+
+class Rotate(_Section):
+    """Turn on the spot, clockwise positive."""
+
+    task: Literal["rotate"]
+    angle_deg: float = Field(ge=-360, le=360, description="Angle from the present heading, clockwise positive.")
+    time_limit_s: TimeLimitS = 60.0
+
+
+class MoveForward(_Section):
+    """Fly a distance straight ahead: in metres, or as far as move_until went."""
+
+    task: Literal["move_forward"]
+    distance_m: Metres | Literal["as_move_until"] = Field(
+        description="Metres, or as_move_until: the distance that the last move_until took."
+    )
+    time_limit_s: TimeLimitS = 120.0
+
+
+class MoveUntil(_Section):
+    """Fly along theta_0 until the line is seen ([Ceron] Algorithm 6.1) and, by default, until it is right below."""
+
+    task: Literal["move_until"]
+    max_distance_m: Metres = Field(40.0, description="Give up when the line was not found within this distance.")
+    n_detections: int = Field(4, ge=1, le=100, description="Frames in a row that must show the line.")
+    until: Literal["overhead", "detected"] = Field(
+        "overhead", description="Stop over the line, or as soon as it was detected as the thesis did."
+    )
+    time_limit_s: TimeLimitS = 90.0
+
+
+class Align(_Section):
+    """Turn until the line runs along the vehicle's axis ([Ceron] Algorithm 6.2)."""
+
+    task: Literal["align"]
+    turn: Literal["nearest", "right", "left"] = Field(
+        "nearest", description="Which way to turn; a line has two directions, and at 90 degrees both are as near."
+    )
+    n_detections: int = Field(4, ge=1, le=100, description="Frames in a row that must be within epsilon.")
+    time_limit_s: TimeLimitS = 45.0
+
+
+class FollowLines(_Section):
+    """Fly along the line by sight ([Ceron] Algorithm 6.3)."""
+
+    task: Literal["follow_lines"]
+    distance_m: Metres = Field(description="How far to fly along the line.")
+    time_limit_s: TimeLimitS = 600.0
+
+
+class Return(_Section):
+    """Fly home and land in the autopilot's own return mode."""
+
+    task: Literal["return"]
+    time_limit_s: TimeLimitS = 300.0
+
+
+class Land(_Section):
+    """Land here in the autopilot's own land mode, and see it disarm."""
+
+    task: Literal["land"]
+    time_limit_s: TimeLimitS = 120.0
+
+
+class Hold(_Section):
+    """Hover for a while."""
+
+    task: Literal["hold"]
+    duration_s: TimeLimitS = Field(description="How long to hover.")
+    time_limit_s: TimeLimitS = 3600.0
+
+
+AnyTask = Takeoff | Ascend | Descend | Rotate | MoveForward | MoveUntil | Align | FollowLines | Return | Land | Hold
+TaskPlan = Annotated[AnyTask, Field(discriminator="task")]
+TASK_MODELS: dict[str, type[BaseModel]] = {
+    get_args(model.model_fields["task"].annotation)[0]: model for model in get_args(AnyTask)
+}
+"""The section of each task, by its name in the file."""
+
+
+class VehiclePlan(_Section):
+    """The link to the autopilot."""
+
+    connection: str = Field(
+        "udpin://0.0.0.0:14540", description="MAVSDK connection URL, e.g. serial:///dev/ttyAMA0:921600."
+    )
+    ready_time_limit_s: TimeLimitS = Field(180.0, description="How long to wait until the vehicle can arm.")
+
+
+class CameraPlan(_Section):
+    """The camera below the vehicle: image up is the vehicle's forward, image right its right."""
+
+    source: str = Field(
+        "v4l2:/dev/video0", description="v4l2:DEVICE or file:PATH; a dry-run uses the simulated camera."
+    )
+    width_px: int = Field(640, ge=64, le=4096)
+    height_px: int = Field(480, ge=64, le=4096)
+    rate_hz: float = Field(30.0, gt=0, le=120)
+    hfov_deg: float = Field(65.0, ge=10, le=150, description="Horizontal field of view of the undistorted image.")
+
+
+class VisionPlan(_Section):
+    """How frames become estimates."""
+
+    presence_scale: float = Field(
+        1.0, gt=0, le=10, description="Multiplies the presence threshold: above 1 asks for more before a line counts."
+    )
+    log_rate_hz: float = Field(4.0, ge=0, le=30, description="Frames a second that the log keeps.")
+
+
+class GuidancePlan(_Section):
+    """How estimates become setpoints."""
+
+    law: Literal["centred", "thesis"] = Field(
+        "centred", description="thesis: yaw alone as in Algorithm 6.3. centred: also keeps the vehicle over the line."
+    )
+    r_m_s: float = Field(2.5, gt=0, le=10, description="r: step length along the line, per second.")
+    P_per_s: float = Field(0.8, gt=0, le=5, description="P: share of the angle's error taken away, per second.")
+    epsilon_deg: float = Field(5.0, gt=0, le=30, description="epsilon: align ends below this angle.")
+    theta_0_deg: float | None = Field(
+        None, ge=-360, le=360, description="theta_0: heading of move_until; by default the yaw at the start."
+    )
+    climb_m_s: float = Field(2.0, gt=0, le=5)
+    descend_m_s: float = Field(1.5, gt=0, le=5)
+    yaw_rate_deg_s: float = Field(45.0, gt=0, le=120)
+    lateral_per_s: float = Field(0.5, gt=0, le=5, description="Share of the offset taken away, per second (centred).")
+    lateral_max_m_s: float = Field(1.0, gt=0, le=5)
+    height_over_line_m: float = Field(
+        6.0, gt=0, le=100, description="Roughly; scales the image offset to metres, an error only changes the gain."
+    )
+    leash_m: float = Field(4.0, gt=0, le=20, description="The setpoint never runs further ahead of the vehicle.")
+    arrival_m: float = Field(0.6, gt=0, le=5, description="The vehicle is there when it is this near.")
+    max_estimate_age_s: float = Field(0.5, gt=0, le=5, description="Older estimates do not steer.")
+
+
+WayDown = Literal["land_clear", "return", "land"]
+
+
+class Reactions(_Section):
+    """What to do about each hazard.
+
+    return: the autopilot's return mode, which lands at the take-off point. land: land right here. land_clear: land
+    here, but return when the line may be below. continue: note it and go on.
+    """
+
+    interrupted: WayDown = Field("land_clear", description="Ctrl-C or SIGTERM: hold, then this.")
+    line_lost: Literal[WayDown, "continue"] = "return"
+    vision_dead: WayDown = "return"
+    task_timed_out: WayDown = "return"
+    task_failed: WayDown = Field("return", description="For example: move_until found no line.")
+    geofence: WayDown = "return"
+    battery_low: Literal[WayDown, "continue"] = "return"
+    battery_critical: WayDown = "land_clear"
+
+
+class SafetyPlan(_Section):
+    """Limits of the flight, and what happens at them."""
+
+    max_distance_m: float = Field(150.0, gt=0, le=2000, description="Radius of the fence around the take-off point.")
+    max_altitude_m: AltitudeM = Field(60.0, description="Height of the fence above the take-off point.")
+    line_lost_s: float = Field(
+        3.0, gt=0, le=60, description="No estimate for so long while following: the line is lost."
+    )
+    telemetry_stale_s: float = Field(1.5, gt=0, le=10)
+    battery_low_percent: float = Field(25.0, ge=5, le=90)
+    battery_critical_percent: float = Field(12.0, ge=2, le=90)
+    reactions: Reactions = Reactions()
+
+
+class MissionPlan(_Section):
+    """A mission file: https://json-schema.org of it stands in missions/mission.schema.json."""
+
+    version: Literal[1] = Field(description="The version of this format.")
+    name: str = Field(pattern=r"^[a-z][a-z0-9_]{0,63}$", description="Lower-case letters, digits and underscores.")
+    description: str = Field("", max_length=2000)
+    tasks: list[TaskPlan] = Field(min_length=1, max_length=200)
+    vehicle: VehiclePlan = VehiclePlan()
+    camera: CameraPlan = CameraPlan()
+    vision: VisionPlan = VisionPlan()
+    guidance: GuidancePlan = GuidancePlan()
+    safety: SafetyPlan = SafetyPlan()

@@ -1,0 +1,175 @@
+"""Reading a mission file: a MissionPlan, or every error at once with file, line and key."""
+
+import difflib
+import json
+from dataclasses import dataclass
+from pathlib import Path
+
+from pydantic import BaseModel, ValidationError
+from pydantic_core import ErrorDetails
+
+from mission.plan import TASK_MODELS, MissionPlan, SafetyPlan
+from mission.plan_rules import check_rules
+from mission.yaml_document import Document, DocumentError, Location, Problem, key_path, parse_document
+
+MAX_BYTES = 256 * 1024
+"""A mission of 200 tasks needs 20 KB; what is larger is not a mission file."""
+
+_MAX_SHOWN_CHARACTERS = 60
+_MAX_SHOWN_PROBLEMS = 40
+
+
+class MissionFileError(Exception):
+    """A mission file that cannot be flown; `problems` holds all that is wrong, in the file's order."""
+
+    def __init__(self, path: Path, problems: list[Problem]) -> None:
+        self.path = path
+        self.problems = sorted(problems, key=lambda problem: problem.line)
+        super().__init__("\n".join(self.lines()))
+
+    def lines(self) -> list[str]:
+        """`file:line: key: what is wrong`, one for each problem."""
+        shown = [
+            ": ".join([f"{self.path}:{problem.line}", *filter(None, [problem.key]), problem.message])
+            for problem in self.problems[:_MAX_SHOWN_PROBLEMS]
+        ]
+        n_hidden = len(self.problems) - _MAX_SHOWN_PROBLEMS
+        return [*shown, f"{self.path}: and {n_hidden} more problems"] if n_hidden > 0 else shown
+
+
+@dataclass(frozen=True, slots=True)
+class MissionFile:
+    """A mission file that was read: the plan, and the text that the log keeps."""
+
+    path: Path
+    text: str
+    plan: MissionPlan
+
+
+def read_mission(path: Path) -> MissionFile:
+    """Read and check a mission file; raises MissionFileError with everything that is wrong."""
+    text = _read_text(path)
+    try:
+        document = parse_document(text)
+    except DocumentError as error:
+        raise MissionFileError(path, error.problems) from None
+    data = document.data
+    if not isinstance(data, dict):
+        words = f"found {_show(data)}; a mission is a mapping with version, name and tasks"
+        raise MissionFileError(path, [Problem(1, "", words)])
+    problems = _rule_problems(data, document)
+    try:
+        plan = MissionPlan.model_validate(data)
+    except ValidationError as error:
+        found = [_problem(details, document) for details in error.errors()]
+        raise MissionFileError(path, _merge_alternatives(found) + problems) from None
+    if problems:
+        raise MissionFileError(path, problems)
+    return MissionFile(path, text, plan)
+
+
+def schema_text() -> str:
+    """The JSON Schema of mission files, as missions/mission.schema.json holds it."""
+    schema = {"$schema": "https://json-schema.org/draft/2020-12/schema", **MissionPlan.model_json_schema()}
+    return json.dumps(schema, indent=2, ensure_ascii=False) + "\n"
+
+
+def _read_text(path: Path) -> str:
+    def refuse(words: str) -> MissionFileError:
+        return MissionFileError(path, [Problem(1, "", words)])
+
+    if path.is_dir():
+        raise refuse("this is a folder; name a mission file")
+    try:
+        with path.open("rb") as file:
+            raw = file.read(MAX_BYTES + 1)
+    except FileNotFoundError:
+        raise refuse("there is no such file; missions/ holds examples") from None
+    except OSError as error:
+        raise refuse(f"cannot be read: {error.strerror}") from None
+    if len(raw) > MAX_BYTES:
+        raise refuse(f"larger than {MAX_BYTES // 1024} KB, so this is not a mission file")
+    try:
+        text = raw.decode("utf-8")
+    except UnicodeDecodeError:
+        raise refuse("not text (UTF-8), so this is not a mission file") from None
+    if not text.strip():
+        raise refuse("empty; a mission needs version, name and tasks")
+    return text
+
+
+def _rule_problems(data: dict[object, object], document: Document) -> list[Problem]:
+    tasks, safety = data.get("tasks"), data.get("safety")
+    fence_m = safety.get("max_altitude_m") if isinstance(safety, dict) else None
+    if fence_m is None:
+        fence_m = SafetyPlan.model_fields["max_altitude_m"].default
+    return [
+        Problem(
+            document.line(broken.location),
+            key_path(broken.location),
+            f"found {broken.found}; allowed: {broken.allowed}",
+        )
+        for broken in check_rules(tasks if isinstance(tasks, list) else [], fence_m)
+    ]
+
+
+def _problem(details: ErrorDetails, document: Document) -> Problem:
+    """Say pydantic's error in the words of a mission file: what was found, what is allowed."""
+    model, location = _model_at(details["loc"])
+    kind, context = details["type"], details.get("ctx", {})
+    if kind == "extra_forbidden" and model is not None:
+        allowed = [name for name in model.model_fields if name != "task"]
+        near = difflib.get_close_matches(str(location[-1]), allowed, n=1, cutoff=0.5)
+        hint = f"did you mean {near[0]}? " if near else ""
+        words = f"unknown key; {hint}allowed: {', '.join(allowed)}"
+    elif kind == "missing":
+        words = "missing; this key must be given"
+    elif kind == "union_tag_invalid":
+        location = (*location, "task")
+        words = f"found {context['tag']}; allowed: {str(context['expected_tags']).replace(chr(39), '')}"
+    elif kind == "union_tag_not_found":
+        words = f"found {_show(details['input'])}; allowed: a mapping with a key named task, e.g. {{task: land}}"
+    elif kind == "float_type":
+        words = f"found {_show(details['input'])}; allowed: a plain number, the unit is in the key's name"
+    else:
+        message = details["msg"].removeprefix("Input should be ")
+        words = f"found {_show(details['input'])}; allowed: {message}"
+    return Problem(document.line(location), key_path(location), words)
+
+
+def _model_at(location: Location) -> tuple[type[BaseModel] | None, Location]:
+    """The section that a pydantic location points into, and the location as the file has it.
+
+    pydantic writes a union's tag behind a task's index (`tasks, 3, align, turn`), and a branch's name behind a key
+    that takes several types (`distance_m, float`); the file has neither.
+    """
+    if location[:1] == ("tasks",):
+        tag = location[2] if len(location) > 2 else None
+        return TASK_MODELS.get(str(tag)), (*location[:2], *location[3:4])
+    model: type[BaseModel] = MissionPlan
+    for part in location[:-1]:
+        field = model.model_fields.get(str(part))
+        if field is None or not isinstance(field.annotation, type) or not issubclass(field.annotation, BaseModel):
+            break
+        model = field.annotation
+    return model, location
+
+
+def _merge_alternatives(problems: list[Problem]) -> list[Problem]:
+    """A key that takes several types yields an error for each; say them as one."""
+    merged: dict[tuple[int, str], Problem] = {}
+    for problem in problems:
+        place = (problem.line, problem.key)
+        if place in merged and "; allowed: " in problem.message:
+            words = f"{merged[place].message}, or {problem.message.split('; allowed: ', 1)[1]}"
+            merged[place] = Problem(problem.line, problem.key, words)
+        else:
+            merged.setdefault(place, problem)
+    return list(merged.values())
+
+
+def _show(value: object) -> str:
+    if value is None:
+        return "nothing"
+    text = json.dumps(value, default=str, ensure_ascii=False)
+    return text if len(text) <= _MAX_SHOWN_CHARACTERS else text[:_MAX_SHOWN_CHARACTERS] + "…"

@@ -1,0 +1,190 @@
+"""The simulated vehicle beside the mission: its process, its camera and its truth. The only file that imports sitl."""
+
+import functools
+import math
+import multiprocessing
+import os
+import signal
+import socket
+import threading
+from collections.abc import Callable
+from multiprocessing.connection import Connection
+from multiprocessing.synchronize import Event as ProcessEvent
+from pathlib import Path
+from types import TracebackType
+from typing import Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.camera.camera import Camera, CameraSettings
+from drivers.clock import ScaledClock
+from mission.autopilot import VehicleState
+from mission.plan import CameraPlan
+from mission.records import TrueLine, TruePose
+from sitl.camera import SimCamera
+from sitl.map import render_map
+from sitl.pose import Pose, PoseBlock
+from sitl.server import SitlSettings, SitlSummary, run
+from sitl.world import World, WorldError, load_world
+
+_STOP_TIMEOUT_S = 5.0
+
+
+class Simulation:
+    """A simulated vehicle in a process of its own, in a world. A context manager; raises WorldError for a bad world.
+
+    `wind_m_s` is the mean wind, with the gusts that belong to it.
+    """
+
+    def __init__(self, world: str | None, clock: ScaledClock, seed: int, wind_m_s: float) -> None:
+        self.world = load_world(world)
+        self._world_name = world
+        self._clock = clock
+        self._seed = seed
+        self._port = free_udp_port()
+        self._poses = PoseBlock.create()
+        self._stop = multiprocessing.get_context("spawn").Event()
+        self._summaries, self._child_summaries = multiprocessing.get_context("spawn").Pipe(duplex=False)
+        settings = sitl_settings(self.world, clock, self._port, seed, wind_m_s, self._poses.name)
+        self._process = multiprocessing.get_context("spawn").Process(
+            target=_serve, args=(settings, self._stop, self._child_summaries), name="lineflight-sitl", daemon=True
+        )
+        self.summary: SitlSummary | None = None
+
+    @property
+    def connection(self) -> str:
+        """Where MAVSDK finds the vehicle."""
+        return f"udpin://127.0.0.1:{self._port}"
+
+    def camera_opener(self, plan: CameraPlan) -> Callable[[], Camera]:
+        """What opens the simulated camera in the vision worker."""
+        return sim_camera_opener(self._world_name, self._poses.name, self._clock, plan, self._seed)
+
+    def true_pose(self) -> TruePose | None:
+        """Where the vehicle truly is; None before the first step."""
+        pose = self._poses.read()
+        return None if pose is None else TruePose(pose.t_ns, pose.north_m, pose.east_m, pose.down_m, pose.yaw_rad)
+
+    def __enter__(self) -> Self:
+        self._process.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._stop.set()
+        if self._summaries.poll(_STOP_TIMEOUT_S):
+            self.summary = self._summaries.recv()
+        self._process.join(_STOP_TIMEOUT_S)
+        if self._process.is_alive():
+            self._process.kill()
+        self._poses.close()
+
+
+class TelemetryCamera:
+    """A simulated camera on a vehicle that flies elsewhere, posed by its telemetry. Raises WorldError for a bad world.
+
+    The autopilot's local origin is taken for the world's, and its estimate for the truth.
+    """
+
+    def __init__(self, world: str | None, clock: ScaledClock, plan: CameraPlan) -> None:
+        load_world(world)
+        self._poses = PoseBlock.create()
+        self.open_camera = sim_camera_opener(world, self._poses.name, clock, plan, seed=1)
+
+    def feed(self, state: VehicleState) -> None:
+        """Publish the vehicle's state as the camera's pose."""
+        quaternion = _quaternion(state.roll_rad, state.pitch_rad, state.yaw_rad)
+        self._poses.write(Pose(state.t_ns, state.north_m, state.east_m, state.down_m, quaternion))
+
+    def close(self) -> None:
+        """Let go of the poses; the camera must be closed before."""
+        self._poses.close()
+
+
+def sim_camera_opener(
+    world: str | None, pose_block: str, clock: ScaledClock, plan: CameraPlan, seed: int
+) -> Callable[[], Camera]:
+    """What opens a simulated camera that hangs on the poses of `pose_block`; picklable."""
+    settings = CameraSettings(plan.width_px, plan.height_px, plan.rate_hz)
+    return functools.partial(SimCamera, world, pose_block, clock, settings, math.radians(plan.hfov_deg), seed)
+
+
+def sitl_settings(
+    world: World, clock: ScaledClock, port: int, seed: int, wind_m_s: float, pose_block: str | None
+) -> SitlSettings:
+    """The simulated vehicle of a world."""
+    return SitlSettings(
+        port=port,
+        seed=seed,
+        wind_m_s=wind_m_s,
+        clock=clock,
+        start_yaw_rad=world.start_yaw_rad,
+        latitude_deg=math.degrees(world.origin.latitude_rad),
+        longitude_deg=math.degrees(world.origin.longitude_rad),
+        altitude_m=world.origin.altitude_m,
+        pose_block=pose_block,
+    )
+
+
+def true_line(world: World) -> TrueLine:
+    """The world's power line as the log keeps it."""
+    return TrueLine(
+        axis_ne_m=world.axis_ne_m,
+        conductors_ned_m=tuple(
+            tuple((float(n), float(e), float(d)) for n, e, d in conductor.points_ned_m) for conductor in world.conductors
+        ),
+        supports_ned_m=tuple(support.top_ned_m for support in world.supports),
+    )
+
+
+def draw_map(
+    world: World, bounds_ne_m: tuple[float, float, float, float], px_per_m: float
+) -> NDArray[np.uint8]:
+    """The world from above, north up, BGR; bounds are south, west, north, east [m]."""
+    return render_map(world, bounds_ne_m, px_per_m)
+
+
+def free_udp_port() -> int:
+    """A UDP port that nobody on this machine uses now."""
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def serve_until_stopped(world: str | None, speed: float, port: int, seed: int, wind_m_s: float) -> SitlSummary:
+    """Run the simulated vehicle in this process until SIGINT or SIGTERM. Raises WorldError."""
+    stop = threading.Event()
+    for signal_number in (signal.SIGINT, signal.SIGTERM):
+        signal.signal(signal_number, lambda _number, _frame: stop.set())
+    clock = ScaledClock(speed, ScaledClock().now_ns())
+    return run(sitl_settings(load_world(world), clock, port, seed, wind_m_s, None), stop.is_set)
+
+
+def _serve(settings: SitlSettings, stop: ProcessEvent, summaries: Connection) -> None:
+    # Ctrl-C reaches every process of the terminal: the vehicle must go on flying until the mission has landed it.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    parent = os.getppid()
+    summaries.send(run(settings, lambda: stop.is_set() or os.getppid() != parent))
+
+
+def _quaternion(roll_rad: float, pitch_rad: float, yaw_rad: float) -> tuple[float, float, float, float]:
+    """Quaternion (w, x, y, z) ned_from_frd of the Euler angles yaw, pitch, roll in this order."""
+    cr, sr = math.cos(roll_rad / 2), math.sin(roll_rad / 2)
+    cp, sp = math.cos(pitch_rad / 2), math.sin(pitch_rad / 2)
+    cy, sy = math.cos(yaw_rad / 2), math.sin(yaw_rad / 2)
+    return (
+        cr * cp * cy + sr * sp * sy,
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+    )
+
+
+def world_path_or_name(text: str | None) -> str | None:
+    """A world given on the command line; a path is made absolute, because other processes open it."""
+    if text is not None and Path(text).suffix in {".yaml", ".yml"}:
+        return str(Path(text).resolve())
+    return text

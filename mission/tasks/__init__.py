@@ -1,0 +1,1 @@
+"""The tasks of a mission, a file for each."""

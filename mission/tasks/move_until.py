@@ -1,0 +1,81 @@
+"""Move until the line: [Ceron] Algorithm 6.1, with the n detections in a row of section 6.4.3."""
+
+import math
+
+from mission.autopilot import Setpoint
+from mission.guidance import GuidanceSettings, step_along
+from mission.tasks.task import FlightMemory, Observation, Step, is_there
+
+
+class MoveUntilTask:
+    """Flies along theta_0 until n frames in a row show the line.
+
+    The thesis stops there. By default we go on until the line is right below, because a vehicle beside the line would
+    follow it from the side, and the way home, which is as long as the way here, would miss the take-off point.
+    """
+
+    needs_line = False
+    needs_vision = True
+
+    def __init__(
+        self,
+        max_distance_m: float,
+        n_detections: int,
+        guidance: GuidanceSettings,
+        memory: FlightMemory,
+        *,
+        is_overhead: bool,
+    ) -> None:
+        self._max_distance_m = max_distance_m
+        self._n_detections = n_detections
+        self._is_overhead = is_overhead
+        self._guidance = guidance
+        self._memory = memory
+        self._moved_m = 0.0
+        self._n_in_a_row = 0
+        self._goal_m: float | None = None
+
+    def step(self, reference: Setpoint, seen: Observation) -> Step:
+        """Move the reference along theta_0, or to where the line crosses the way once that is known."""
+        heading_rad = self._memory.theta_0_rad
+        self._look(reference, seen, heading_rad)
+        limit_m = self._guidance.r_m_s * seen.dt_s
+        goal_m = self._max_distance_m if self._goal_m is None else self._goal_m
+        step_m = max(-limit_m, min(limit_m, goal_m - self._moved_m))
+        self._moved_m += step_m
+        setpoint = step_along(reference, heading_rad, step_m)
+        if self._goal_m is None:
+            if self._moved_m >= self._max_distance_m and is_there(seen.state, setpoint, self._guidance.arrival_m):
+                return Step(setpoint, failed=f"no line within {self._max_distance_m:g} m")
+            return Step(setpoint)
+        if abs(self._goal_m - self._moved_m) < limit_m and is_there(seen.state, setpoint, self._guidance.arrival_m):
+            self._memory.move_until_m = self._from_start_m(setpoint, heading_rad)
+            where = "over the line" if self._is_overhead else "the line is in sight"
+            return Step(setpoint, done=f"{where} after {self._moved_m:.1f} m")
+        return Step(setpoint)
+
+    def _from_start_m(self, setpoint: Setpoint, heading_rad: float) -> float:
+        """The distance from the take-off point along the heading, which the way home will need [m].
+
+        It is not the distance flown: wind and the autopilot's take-off leave the vehicle beside its take-off point.
+        """
+        start = self._memory.start
+        north_m, east_m = setpoint.north_m - start.north_m, setpoint.east_m - start.east_m
+        return max(0.0, north_m * math.cos(heading_rad) + east_m * math.sin(heading_rad))
+
+    def _look(self, reference: Setpoint, seen: Observation, heading_rad: float) -> None:
+        """Count the detections; from the n-th on, set the goal."""
+        sight = seen.sight
+        if sight is None:
+            return
+        if sight.line is None:
+            self._n_in_a_row = 0
+            return
+        self._n_in_a_row += 1
+        if self._n_in_a_row < self._n_detections:
+            return
+        crossing_m = sight.line.crossing_m(reference.north_m, reference.east_m, heading_rad)
+        if not self._is_overhead or crossing_m is None:
+            self._goal_m = self._moved_m if self._goal_m is None else self._goal_m
+        elif math.isfinite(crossing_m):
+            self._goal_m = min(self._moved_m + crossing_m, self._max_distance_m)

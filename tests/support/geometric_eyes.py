@@ -1,0 +1,103 @@
+"""Eyes that know the world: where a straight line at a known height appears in the image of the true pose.
+
+It goes from the world to the image by the rotation matrix of the true attitude, so it checks guidance, which goes the
+other way by Euler angles, rather than repeating it.
+"""
+
+import math
+
+import numpy as np
+
+from drivers.camera.camera import Intrinsics
+from drivers.clock import Clock
+from tests.support.in_process import InProcessAutopilot
+from vision.records import LineEstimate, VisionReport, wrap_line_angle_rad
+
+_NO_SEGMENTS = np.zeros((0, 4))
+FRAME_PERIOD_NS = 40_000_000
+LATENCY_NS = 60_000_000
+
+
+def rotation_ned_from_frd(quaternion: tuple[float, float, float, float]) -> np.ndarray:
+    """The rotation matrix of a quaternion (w, x, y, z)."""
+    w, x, y, z = quaternion
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def see_line(
+    position_ned_m: tuple[float, float, float],
+    quaternion: tuple[float, float, float, float],
+    camera: Intrinsics,
+    line_point_ned_m: tuple[float, float, float],
+    line_heading_rad: float,
+    t_capture_ns: int = 0,
+) -> LineEstimate | None:
+    """The estimate of a straight level line; None where it does not cross the image."""
+    frd_from_ned = rotation_ned_from_frd(quaternion).T
+    along = np.array([math.cos(line_heading_rad), math.sin(line_heading_rad), 0.0])
+    points_px = []
+    for reach_m in np.linspace(-60.0, 60.0, 241):
+        body = frd_from_ned @ (np.array(line_point_ned_m) + reach_m * along - np.array(position_ned_m))
+        if body[2] > 0.2:
+            points_px.append(
+                (camera.cx_px + camera.fx_px * body[1] / body[2], camera.cy_px - camera.fy_px * body[0] / body[2])
+            )
+    inside = [
+        (x, y) for x, y in points_px if 0 <= x <= camera.width_px - 1 and 0 <= y <= camera.height_px - 1
+    ]
+    if len(inside) < 3:
+        return None
+    (x0, y0), (x1, y1) = inside[0], inside[-1]
+    angle_rad = wrap_line_angle_rad(math.atan2(x1 - x0, -(y1 - y0)))
+    normal = (math.cos(angle_rad), math.sin(angle_rad))
+    centre = ((camera.width_px - 1) / 2, (camera.height_px - 1) / 2)
+    offset_px = normal[0] * (x0 - centre[0]) + normal[1] * (y0 - centre[1])
+    return LineEstimate(angle_rad, offset_px, 3, 1.0, t_capture_ns)
+
+
+class GeometricEyes:
+    """mission.eyes.Eyes over a straight line. `is_blind` shows nothing, `failure` is a dead worker."""
+
+    def __init__(
+        self,
+        autopilot: InProcessAutopilot,
+        clock: Clock,
+        camera: Intrinsics,
+        line_point_ned_m: tuple[float, float, float],
+        line_heading_rad: float,
+    ) -> None:
+        self._autopilot = autopilot
+        self._clock = clock
+        self._camera = camera
+        self._point = line_point_ned_m
+        self._heading_rad = line_heading_rad
+        self._next_ns = 0
+        self._seq = 0
+        self._pending: list[VisionReport] = []
+        self.is_blind = False
+        self.failure: str | None = None
+        self.is_ready = True
+
+    def take(self) -> list[VisionReport]:
+        """Look whenever a frame is due; hand it over when its latency has passed."""
+        now_ns = self._clock.now_ns()
+        self._autopilot.catch_up()
+        if now_ns >= self._next_ns and self.failure is None:
+            self._next_ns = now_ns + FRAME_PERIOD_NS
+            vehicle = self._autopilot.sim.vehicle
+            estimate = None
+            if not self.is_blind:
+                estimate = see_line(
+                    vehicle.position_m, vehicle.quaternion, self._camera, self._point, self._heading_rad, now_ns
+                )
+            self._pending.append(VisionReport(self._seq, now_ns, estimate, _NO_SEGMENTS, LATENCY_NS, 0, 0, None))
+            self._seq += 1
+        due = [report for report in self._pending if now_ns - report.t_capture_ns >= LATENCY_NS]
+        self._pending = [report for report in self._pending if now_ns - report.t_capture_ns < LATENCY_NS]
+        return due

@@ -1,0 +1,124 @@
+"""The simulated vehicle behind the mission's Autopilot protocol, in virtual time and without a socket.
+
+It shows what MAVLink would: mode and armed state are told once a second, as PX4's heartbeat does.
+"""
+
+import math
+
+from drivers.clock import Clock
+from mission.autopilot import AutopilotError, FlightMode, LandedState, Setpoint, VehicleState
+from sitl.autopilot import SimAutopilot
+from sitl.modes import Answer, Landed, Mode
+from sitl.vehicle import Vehicle, euler_of
+from sitl.wind import Wind
+
+_STEP_S = 0.008
+_MODES = {
+    Mode.TAKEOFF: FlightMode.TAKEOFF,
+    Mode.LOITER: FlightMode.HOLD,
+    Mode.OFFBOARD: FlightMode.OFFBOARD,
+    Mode.RTL: FlightMode.RETURN,
+    Mode.LAND: FlightMode.LAND,
+}
+_LANDED = {
+    Landed.ON_GROUND: LandedState.ON_GROUND,
+    Landed.TAKEOFF: LandedState.TAKING_OFF,
+    Landed.IN_AIR: LandedState.IN_AIR,
+    Landed.LANDING: LandedState.LANDING,
+}
+
+
+class InProcessAutopilot:
+    """A mission.autopilot.Autopilot. The vehicle is stepped up to the clock whenever anybody asks anything of it."""
+
+    def __init__(self, clock: Clock, *, start_yaw_rad: float = 0.0, wind_m_s: float = 0.0, seed: int = 1) -> None:
+        self._clock = clock
+        self.sim = SimAutopilot(Vehicle(yaw_rad=start_yaw_rad), Wind(wind_m_s, seed), seed=seed)
+        self._heartbeat: tuple[Mode, bool] = (self.sim.mode, False)
+        self._heartbeat_s = 0.0
+        self.is_connected = True
+        self.commands: list[str] = []
+
+    def catch_up(self) -> None:
+        """Step the vehicle to now."""
+        now_s = self._clock.now_ns() / 1e9
+        while self.sim.boot_s + _STEP_S <= now_s:
+            self.sim.step(_STEP_S)
+            if self.sim.boot_s - self._heartbeat_s >= 1.0:
+                self._heartbeat_s += 1.0
+                self._heartbeat = (self.sim.mode, self.sim.is_armed)
+
+    @property
+    def state(self) -> VehicleState | None:
+        self.catch_up()
+        estimate = self.sim.estimate
+        roll_rad, pitch_rad, yaw_rad = euler_of(estimate.quaternion)
+        mode, is_armed = self._heartbeat
+        return VehicleState(
+            self._clock.now_ns() if self.is_connected else 0,
+            *estimate.position_m,
+            *estimate.velocity_m_s,
+            roll_rad,
+            pitch_rad,
+            yaw_rad,
+            _MODES.get(mode, FlightMode.OTHER),
+            is_armed,
+            _LANDED[self.sim.landed],
+            self.sim.battery.remaining,
+            self.is_connected,
+        )
+
+    def drain_status_texts(self) -> list[str]:
+        return [text for _, text in self.sim.drain_texts()]
+
+    async def connect(self) -> None:
+        self.catch_up()
+
+    def missing_health(self) -> list[str]:
+        self.catch_up()
+        return [] if self.sim.boot_s > 5.0 else ["global position (GPS)"]
+
+    async def arm(self) -> None:
+        self._command("arm", self.sim.arm)
+
+    async def takeoff(self, altitude_m: float) -> None:
+        self.catch_up()
+        self.sim.set_parameter("MIS_TAKEOFF_ALT", altitude_m)
+        self._command("takeoff", self.sim.takeoff)
+
+    async def start_offboard(self, setpoint: Setpoint) -> None:
+        await self.set_setpoint(setpoint)
+        self._command("offboard", lambda: self.sim.set_mode(Mode.OFFBOARD))
+
+    async def set_setpoint(self, setpoint: Setpoint) -> None:
+        self.catch_up()
+        self.sim.set_position_setpoint(setpoint.north_m, setpoint.east_m, setpoint.down_m, setpoint.yaw_rad)
+
+    async def hold(self) -> None:
+        self._command("hold", lambda: self.sim.set_mode(Mode.LOITER))
+
+    async def return_home(self) -> None:
+        self._command("return", lambda: self.sim.set_mode(Mode.RTL))
+
+    async def land(self) -> None:
+        self._command("land", self.sim.land)
+
+    async def close(self) -> None:
+        self.commands.append("close")
+
+    def _command(self, name: str, act: "object") -> None:
+        self.catch_up()
+        self.commands.append(name)
+        answer = act()  # type: ignore[operator]
+        if answer is not Answer.ACCEPTED:
+            raise AutopilotError(f"the autopilot refused to {name}: {answer.name.lower()}")
+
+    @property
+    def true_yaw_rad(self) -> float:
+        """The vehicle's true heading."""
+        return euler_of(self.sim.vehicle.quaternion)[2]
+
+    @property
+    def true_distance_m(self) -> float:
+        """How far the vehicle truly is from where it started, level."""
+        return math.hypot(self.sim.vehicle.position_m[0], self.sim.vehicle.position_m[1])
