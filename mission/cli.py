@@ -95,9 +95,7 @@ def run(
     connection: Annotated[
         str | None, typer.Option(help="MAVSDK URL, e.g. serial:///dev/ttyAMA0:921600; else the mission's.")
     ] = None,
-    camera: Annotated[
-        str | None, typer.Option(help="v4l2:DEVICE, file:PATH or sim:WORLD; else the mission's.")
-    ] = None,
+    camera: Annotated[str | None, typer.Option(help="v4l2:DEVICE, file:PATH or sim:WORLD; else the mission's.")] = None,
     log: LogOption = Path("logs"),
     as_json: JsonOption = False,
 ) -> None:
@@ -141,7 +139,9 @@ def sitl(
         summary = serve_until_stopped(world_path_or_name(world), speed, port, seed, wind)
     except (WorldError, OSError) as error:
         _fail(str(error), EXIT_BAD_INPUT)
-    typer.echo(f"{summary.simulated_s:.1f} s flown in {summary.wall_s:.1f} s: {summary.achieved_speed:.2f} times", err=True)
+    typer.echo(
+        f"{summary.simulated_s:.1f} s flown in {summary.wall_s:.1f} s: {summary.achieved_speed:.2f} times", err=True
+    )
 
 
 @app.command()
@@ -207,7 +207,7 @@ def _finish(outcome: "FlightOutcome", *, as_json: bool, simulation: "Simulation 
     from mission.log.summary import to_json
 
     report = _summarise(outcome.log)
-    picture = _draw(outcome.log, report, simulation)
+    picture = _draw(outcome.log, simulation)
     speed = None if simulation is None or simulation.summary is None else simulation.summary.achieved_speed
     if as_json:
         extra = {"log": str(outcome.log), "picture": None if picture is None else str(picture), "achieved_speed": speed}
@@ -235,11 +235,15 @@ def _exit_code(outcome: "FlightOutcome") -> int:
     )
 
 
-def _draw(log: Path, report: "FlightReport", simulation: "Simulation | None") -> Path | None:
-    """The flight's picture, beside the log."""
+def _draw(log: Path, simulation: "Simulation | None") -> Path | None:
+    """The flight's picture, beside the log; None, with a word, when it cannot be written."""
     from mission.flight_picture import write_picture
 
-    return write_picture(log, report, None if simulation is None else simulation.world)
+    try:
+        return write_picture(log, None if simulation is None else simulation.world)
+    except OSError as error:
+        sys.stderr.write(f"The picture beside {log} cannot be written: {error.strerror}.\n")
+        return None
 
 
 def _summarise(log: Path) -> "FlightReport":

@@ -29,7 +29,7 @@ class DetectError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class Picture:
-    """An image to look at, BGR uint8, or None with why it could not be read. `frame` numbers a video's frames from 0."""
+    """An image to look at, BGR uint8, or None with why it could not be read. `frame` counts a video's frames from 0."""
 
     file: Path
     frame: int | None
@@ -156,4 +156,6 @@ def _write_drawing(file: Path, image: NDArray[np.uint8]) -> None:
         if is_written:
             file.write_bytes(encoded.tobytes())
     except (OSError, cv2.error) as error:
-        raise DetectError(f"The drawing {file} cannot be written: {error}; name a .png or .jpg file or a folder.") from None
+        raise DetectError(
+            f"The drawing {file} cannot be written: {error}; name a .png or .jpg file or a folder."
+        ) from None

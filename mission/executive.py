@@ -342,6 +342,7 @@ class Executive:
             allowed_modes=self._allowed_modes(now_ns, state),
             distance_m=math.hypot(state.north_m - start.north_m, state.east_m - start.east_m),
             altitude_m=start.down_m - state.down_m,
+            is_going_down=isinstance(task, GoDownTask),
             task_age_s=(now_ns - self._task_started_ns) / NS_PER_S,
             task_limit_s=GOING_DOWN_LIMIT_S if index is None else self._plan.tasks[index].time_limit_s,
             needs_line=task is not None and task.needs_line,

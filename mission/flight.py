@@ -30,8 +30,8 @@ _POSE_RATE_HZ = 100.0
 class FlightSetup:
     """What a flight is made of. `open_camera` is called in the vision worker.
 
-    `true_line` and `true_pose` are known for a simulated vehicle alone; `feed_pose` gets the telemetry where a camera is
-    simulated for a vehicle that flies elsewhere.
+    `true_line` and `true_pose` are known for a simulated vehicle alone; `feed_pose` gets the telemetry where a camera
+    is simulated for a vehicle that flies elsewhere.
     """
 
     mission: MissionFile
@@ -127,4 +127,3 @@ def _stop_signals(stop: Callable[[], None]) -> Iterator[None]:
     finally:
         for number in (signal.SIGINT, signal.SIGTERM):
             loop.remove_signal_handler(number)
-

@@ -1,13 +1,29 @@
 """The picture of a flight, written beside its log."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import cv2
+import numpy as np
 
-from mission.log.picture import draw_summary
+from mission.log.picture import draw_summary, flight_view
 from mission.log.reader import read_flight
-from mission.log.summary import FlightReport
+from mission.log.summary import summarise
+from mission.log.track_map import MapBackground
+from mission.simulation import World, draw_map
 
-if TYPE_CHECKING:
-    from sitl.world import World
+
+def write_picture(log: Path, world: World | None) -> Path:
+    """Draw the flight of a log as `<log>.png`; `world` gives its ground where it was simulated.
+
+    Raises LogError for a log that cannot be read, OSError where the picture cannot be written.
+    """
+    flight = read_flight(log, with_images=True)
+    background = None
+    if world is not None:
+        view = flight_view(flight)
+        background = MapBackground(draw_map(world, view.bounds_ne_m, view.px_per_m), view.bounds_ne_m)
+    image = draw_summary(flight, summarise(flight), background)
+    _, encoded = cv2.imencode(".png", np.asarray(image))
+    file = log.with_suffix(".png")
+    file.write_bytes(encoded.tobytes())
+    return file

@@ -150,9 +150,7 @@ def step_level_towards(reference: Setpoint, goal: Setpoint, max_m_s: float, dt_s
     north_m, east_m = goal.north_m - reference.north_m, goal.east_m - reference.east_m
     distance_m = math.hypot(north_m, east_m)
     share = min(1.0, max_m_s * dt_s / distance_m) if distance_m > 0.0 else 0.0
-    return replace(
-        reference, north_m=reference.north_m + share * north_m, east_m=reference.east_m + share * east_m
-    )
+    return replace(reference, north_m=reference.north_m + share * north_m, east_m=reference.east_m + share * east_m)
 
 
 def step_vertical(reference: Setpoint, down_m: float, max_m_s: float, dt_s: float) -> Setpoint:

@@ -127,8 +127,14 @@ def _problem(details: ErrorDetails, document: Document) -> Problem:
     elif kind == "union_tag_invalid":
         location = (*location, "task")
         words = f"found {context['tag']}; allowed: {str(context['expected_tags']).replace(chr(39), '')}"
-    elif kind == "union_tag_not_found":
+    elif kind in ("union_tag_not_found", "model_attributes_type"):
         words = f"found {_show(details['input'])}; allowed: a mapping with a key named task, e.g. {{task: land}}"
+    elif kind == "model_type":
+        words = f"found {_show(details['input'])}; allowed: a mapping of keys"
+    elif kind == "string_pattern_mismatch":
+        words = f"found {_show(details['input'])}; allowed: {context['pattern']} (as a regular expression)"
+    elif kind == "too_short":
+        words = f"found {_show(details['input'])}; allowed: at least {context['min_length']}"
     elif kind == "float_type":
         words = f"found {_show(details['input'])}; allowed: a plain number, the unit is in the key's name"
     else:

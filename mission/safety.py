@@ -72,8 +72,9 @@ class SafetyLimits:
 class SafetyInput:
     """What safety looks at in one tick. Distances are from the take-off point, times are flight time.
 
-    `allowed_modes` are the flight modes that our own last command explains. `needs_line` is true for tasks that steer
-    by the line, and `line_seen_ns` is the capture time of the newest estimate, or the task's start before the first.
+    `allowed_modes` are the flight modes that our own last command explains, and `is_going_down` says that it was to
+    land or to return. `needs_line` is true for tasks that steer by the line, and `line_seen_ns` is the capture time of the
+    newest estimate, or the task's start before the first.
     `task_failure`, `refusal` (of a command, by the autopilot) and `internal_error` are sentences; None: all is well.
     """
 
@@ -82,6 +83,7 @@ class SafetyInput:
     allowed_modes: frozenset[FlightMode]
     distance_m: float
     altitude_m: float
+    is_going_down: bool
     task_age_s: float
     task_limit_s: float
     needs_line: bool
@@ -115,7 +117,9 @@ def find_hazards(seen: SafetyInput, limits: SafetyLimits) -> dict[Hazard, str]:
         found[Hazard.BATTERY_CRITICAL] = f"the battery is at {battery:.0%}"
     if seen.is_interrupted:
         found[Hazard.INTERRUPTED] = "the operator asked to stop"
-    if seen.distance_m > limits.max_distance_m:
+    if seen.is_going_down:
+        pass  # the autopilot chooses its own way home, and RTL_RETURN_ALT may lie above the fence
+    elif seen.distance_m > limits.max_distance_m:
         found[Hazard.GEOFENCE] = (
             f"{seen.distance_m:.0f} m from the take-off point, allowed are {limits.max_distance_m:g} m"
         )

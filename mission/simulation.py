@@ -28,6 +28,8 @@ from sitl.pose import Pose, PoseBlock
 from sitl.server import SitlSettings, SitlSummary, run
 from sitl.world import World, WorldError, load_world
 
+__all__ = ["Simulation", "TelemetryCamera", "World", "WorldError", "draw_map", "serve_until_stopped", "true_line"]
+
 _STOP_TIMEOUT_S = 5.0
 
 
@@ -133,15 +135,14 @@ def true_line(world: World) -> TrueLine:
     return TrueLine(
         axis_ne_m=world.axis_ne_m,
         conductors_ned_m=tuple(
-            tuple((float(n), float(e), float(d)) for n, e, d in conductor.points_ned_m) for conductor in world.conductors
+            tuple((float(n), float(e), float(d)) for n, e, d in conductor.points_ned_m)
+            for conductor in world.conductors
         ),
         supports_ned_m=tuple(support.top_ned_m for support in world.supports),
     )
 
 
-def draw_map(
-    world: World, bounds_ne_m: tuple[float, float, float, float], px_per_m: float
-) -> NDArray[np.uint8]:
+def draw_map(world: World, bounds_ne_m: tuple[float, float, float, float], px_per_m: float) -> NDArray[np.uint8]:
     """The world from above, north up, BGR; bounds are south, west, north, east [m]."""
     return render_map(world, bounds_ne_m, px_per_m)
 

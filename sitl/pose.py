@@ -6,7 +6,7 @@ a write is under way tells a reader to look again (a seqlock), so that the write
 
 import math
 from dataclasses import dataclass
-from multiprocessing import resource_tracker, shared_memory
+from multiprocessing import shared_memory
 from typing import Self
 
 import numpy as np
@@ -51,11 +51,11 @@ class PoseBlock:
 
     @classmethod
     def attach(cls, name: str) -> Self:
-        """Attach to an existing block; raises FileNotFoundError when there is none of that name."""
-        memory = shared_memory.SharedMemory(name=name)
-        # Python < 3.13 registers attached memory too, and the first reader to end would unlink it for all.
-        resource_tracker.unregister(memory._name, "shared_memory")  # type: ignore[attr-defined]
-        return cls(memory, is_owner=False)
+        """Attach to an existing block, in the owner's process or a child of it.
+
+        Raises FileNotFoundError when there is none of that name.
+        """
+        return cls(shared_memory.SharedMemory(name=name), is_owner=False)
 
     @property
     def name(self) -> str:

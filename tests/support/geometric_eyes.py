@@ -16,6 +16,7 @@ from vision.records import LineEstimate, VisionReport, wrap_line_angle_rad
 _NO_SEGMENTS = np.zeros((0, 4))
 FRAME_PERIOD_NS = 40_000_000
 LATENCY_NS = 60_000_000
+_REACHES_M = np.linspace(-60.0, 60.0, 241)
 
 
 def rotation_ned_from_frd(quaternion: tuple[float, float, float, float]) -> np.ndarray:
@@ -39,21 +40,17 @@ def see_line(
     t_capture_ns: int = 0,
 ) -> LineEstimate | None:
     """The estimate of a straight level line; None where it does not cross the image."""
-    frd_from_ned = rotation_ned_from_frd(quaternion).T
     along = np.array([math.cos(line_heading_rad), math.sin(line_heading_rad), 0.0])
-    points_px = []
-    for reach_m in np.linspace(-60.0, 60.0, 241):
-        body = frd_from_ned @ (np.array(line_point_ned_m) + reach_m * along - np.array(position_ned_m))
-        if body[2] > 0.2:
-            points_px.append(
-                (camera.cx_px + camera.fx_px * body[1] / body[2], camera.cy_px - camera.fy_px * body[0] / body[2])
-            )
-    inside = [
-        (x, y) for x, y in points_px if 0 <= x <= camera.width_px - 1 and 0 <= y <= camera.height_px - 1
-    ]
-    if len(inside) < 3:
+    points = np.array(line_point_ned_m) + _REACHES_M[:, None] * along - np.array(position_ned_m)
+    body = points @ rotation_ned_from_frd(quaternion)  # the inverse rotation of each row
+    body = body[body[:, 2] > 0.2]
+    x = camera.cx_px + camera.fx_px * body[:, 1] / body[:, 2]
+    y = camera.cy_px - camera.fy_px * body[:, 0] / body[:, 2]
+    is_inside = (x >= 0) & (x <= camera.width_px - 1) & (y >= 0) & (y <= camera.height_px - 1)
+    if is_inside.sum() < 3:
         return None
-    (x0, y0), (x1, y1) = inside[0], inside[-1]
+    x0, x1 = (float(end) for end in x[is_inside][[0, -1]])
+    y0, y1 = (float(end) for end in y[is_inside][[0, -1]])
     angle_rad = wrap_line_angle_rad(math.atan2(x1 - x0, -(y1 - y0)))
     normal = (math.cos(angle_rad), math.sin(angle_rad))
     centre = ((camera.width_px - 1) / 2, (camera.height_px - 1) / 2)

@@ -12,7 +12,7 @@ from sitl.modes import Answer, Landed, Mode
 from sitl.vehicle import Vehicle, euler_of
 from sitl.wind import Wind
 
-_STEP_S = 0.008
+_STEP_S = 0.01
 _MODES = {
     Mode.TAKEOFF: FlightMode.TAKEOFF,
     Mode.LOITER: FlightMode.HOLD,

@@ -1,0 +1,183 @@
+"""A recording as a camera: a video file, one image, or a folder of images, played at its own pace."""
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from types import TracebackType
+from typing import Protocol, Self
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.camera.camera import CameraError, CameraSettings, Frame
+from drivers.clock import NS_PER_S, Clock
+
+IMAGE_SUFFIXES = frozenset({".bmp", ".jpeg", ".jpg", ".pgm", ".png", ".ppm", ".tif", ".tiff", ".webp"})
+
+
+class Recording(Protocol):
+    """Images in order, which can be skipped cheaply."""
+
+    def skip(self) -> bool:
+        """Pass over the next image; False at the end."""
+        ...
+
+    def read(self) -> NDArray[np.uint8] | None:
+        """Decode the next image, (h, w, 3) BGR; None at the end. Raises CameraError when it cannot be decoded."""
+        ...
+
+    def close(self) -> None:
+        """Let go of the files."""
+        ...
+
+
+class ImageFiles:
+    """Image files in the order given."""
+
+    def __init__(self, paths: list[Path]) -> None:
+        self._paths = iter(paths)
+
+    def skip(self) -> bool:
+        """Pass over the next image; False at the end."""
+        return next(self._paths, None) is not None
+
+    def read(self) -> NDArray[np.uint8] | None:
+        """Decode the next image, (h, w, 3) BGR; None at the end. Raises CameraError when it cannot be decoded."""
+        path = next(self._paths, None)
+        if path is None:
+            return None
+        image = cv2.imread(str(path), cv2.IMREAD_COLOR)
+        if image is None:
+            raise CameraError(f"The image {path} cannot be decoded; remove it from the recording.")
+        return np.asarray(image, dtype=np.uint8)
+
+    def close(self) -> None:
+        """Nothing stays open between two images."""
+
+
+class VideoFile:
+    """A video, by whatever OpenCV decodes it with."""
+
+    def __init__(self, capture: cv2.VideoCapture) -> None:
+        self._capture = capture
+
+    def skip(self) -> bool:
+        """Pass over the next image; False at the end."""
+        return self._capture.grab()
+
+    def read(self) -> NDArray[np.uint8] | None:
+        """Decode the next image, (h, w, 3) BGR; None at the end."""
+        is_read, image = self._capture.read()
+        return np.asarray(image, dtype=np.uint8) if is_read else None
+
+    def close(self) -> None:
+        """Let go of the file."""
+        self._capture.release()
+
+
+class RecordedCamera:
+    """Plays a recording against the clock: frame i is taken i periods after the first read began.
+
+    Like a live camera it does not wait for a slow reader: frames whose time has passed are skipped, and show as a gap
+    in `seq`. Time starts with the first read, so that opening early costs no frames.
+    """
+
+    def __init__(
+        self,
+        recording: Recording,
+        settings: CameraSettings,
+        clock: Clock,
+        sleep: Callable[[float], None] = time.sleep,
+    ) -> None:
+        self._recording = recording
+        self._settings = settings
+        self._period_ns = round(NS_PER_S / settings.rate_hz)
+        self._clock = clock
+        self._sleep = sleep
+        self._start_ns: int | None = None
+        self._next_seq = 0
+
+    def read(self, timeout_s: float) -> Frame | None:
+        """Wait for the next frame's time and return it, or the newest that is due; None after `timeout_s` [s, wall].
+
+        Raises EOFError at the recording's end, CameraError when an image is damaged or of another size.
+        """
+        now_ns = self._clock.now_ns()
+        if self._start_ns is None:
+            self._start_ns = now_ns
+        wait_s = self._clock.wall_s((self._start_ns + self._next_seq * self._period_ns - now_ns) / NS_PER_S)
+        if wait_s > timeout_s:
+            self._sleep(timeout_s)
+            return None
+        if wait_s > 0:
+            self._sleep(wait_s)
+        newest = max(self._next_seq, (self._clock.now_ns() - self._start_ns) // self._period_ns)
+        while self._next_seq < newest and self._recording.skip():
+            self._next_seq += 1
+        image = self._recording.read()
+        if image is None:
+            raise EOFError("The recording has ended.")
+        check_size(image, self._settings)
+        image.setflags(write=False)
+        frame = Frame(self._next_seq, self._start_ns + self._next_seq * self._period_ns, image)
+        self._next_seq += 1
+        return frame
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._recording.close()
+
+
+def open_recording(path: Path, settings: CameraSettings, clock: Clock) -> RecordedCamera:
+    """Open a video, an image, or a folder of images (in the order of their names).
+
+    A video plays at the rate it was taken at, images at `settings.rate_hz`. Raises CameraError when there is no such
+    file, nothing in it can be decoded, or its size is not the one of `settings`.
+    """
+    if path.is_dir():
+        paths = sorted(entry for entry in path.iterdir() if entry.suffix.lower() in IMAGE_SUFFIXES)
+        if not paths:
+            raise CameraError(f"The folder {path} holds no images; name a folder with .png or .jpg files.")
+    elif not path.exists():
+        raise CameraError(f"There is no recording at {path}; check the path behind 'file:'.")
+    elif path.suffix.lower() in IMAGE_SUFFIXES:
+        paths = [path]
+    else:
+        return _open_video(path, settings, clock)
+    first = ImageFiles(paths[:1]).read()
+    if first is not None:
+        check_size(first, settings)
+    return RecordedCamera(ImageFiles(paths), settings, clock)
+
+
+def check_size(image: NDArray[np.uint8], settings: CameraSettings) -> None:
+    """Raise CameraError when `image`, (h, w, ...), is not of the size that was asked for."""
+    height_px, width_px = image.shape[:2]
+    if (width_px, height_px) != (settings.width_px, settings.height_px):
+        raise CameraError(
+            f"The recording is {width_px} x {height_px} px but the camera settings ask for "
+            f"{settings.width_px} x {settings.height_px} px; change the settings or rescale the recording."
+        )
+
+
+def _open_video(path: Path, settings: CameraSettings, clock: Clock) -> RecordedCamera:
+    capture = cv2.VideoCapture(str(path))
+    if not capture.isOpened():
+        raise CameraError(f"The file {path} is neither an image nor a video that can be decoded; convert it first.")
+    rate_hz = capture.get(cv2.CAP_PROP_FPS)
+    paced = CameraSettings(settings.width_px, settings.height_px, rate_hz if rate_hz > 0 else settings.rate_hz)
+    is_read, image = capture.read()
+    if not is_read:
+        capture.release()
+        raise CameraError(f"The video {path} holds no frame that can be decoded; convert it first.")
+    try:
+        check_size(np.asarray(image, dtype=np.uint8), settings)
+    finally:
+        capture.release()
+    # A fresh capture starts at the first frame for certain; seeking back is not exact in every container.
+    return RecordedCamera(VideoFile(cv2.VideoCapture(str(path))), paced, clock)

@@ -1,0 +1,100 @@
+"""The table of everything a flight log holds: which topic carries what, in which schema, how often."""
+
+from dataclasses import dataclass
+from typing import Any
+
+from pydantic import TypeAdapter
+
+from drivers.clock import NS_PER_S
+from mission.autopilot import VehicleState
+from mission.log.records import MissionFile, SentSetpoint, StatusText, VisionEntry
+from mission.records import Event, MissionEnded, TaskEnded, TaskStarted, TrueLine, TruePose
+
+PROFILE = "lineflight"
+
+
+@dataclass(frozen=True, slots=True)
+class RecordChannel:
+    """A topic of records as JSON, one record type each: all that a report needs.
+
+    The JSON Schema follows from the record's fields, so units stand in their names. `max_rate_hz` [1/s, flight] thins
+    what comes more often; None keeps all.
+    """
+
+    topic: str
+    record: type
+    what: str
+    rate: str
+    max_rate_hz: float | None = None
+
+
+@dataclass(frozen=True, slots=True)
+class FoxgloveChannel:
+    """A topic in one of Foxglove's own schemas (protobuf), for its panels; nothing of ours reads it but the images."""
+
+    topic: str
+    schema: str
+    what: str
+    rate: str
+
+
+RECORD_CHANNELS = (
+    RecordChannel("/mission", MissionFile, "the mission file, and how log times belong to flight times", "once"),
+    RecordChannel("/vehicle/state", VehicleState, "the vehicle as telemetry tells it", "every control tick"),
+    RecordChannel("/setpoint", SentSetpoint, "the offboard setpoints", "every control tick while offboard"),
+    RecordChannel("/vision/report", VisionEntry, "line estimates and power lines", "every frame worked on"),
+    RecordChannel("/task/started", TaskStarted, "the executive entered a task", "on change"),
+    RecordChannel("/task/ended", TaskEnded, "the executive left a task, and why", "on change"),
+    RecordChannel("/mission/ended", MissionEnded, "how the flight ended", "once"),
+    RecordChannel("/event", Event, "what happened and what was done about it", "on change"),
+    RecordChannel("/status_text", StatusText, "the autopilot's own words", "on change"),
+    RecordChannel("/truth/pose", TruePose, "where a simulated vehicle truly was", "at most 20 Hz", max_rate_hz=20.0),
+    RecordChannel("/truth/line", TrueLine, "the simulated power line", "once"),
+)
+
+IMAGE = FoxgloveChannel("/camera", "foxglove.CompressedImage", "the camera's frames as JPEG", "the log's frame rate")
+ANNOTATIONS = FoxgloveChannel(
+    "/camera/lines", "foxglove.ImageAnnotations", "the power lines found on a frame, at its time", "with each frame"
+)
+TRANSFORM = FoxgloveChannel("/tf", "foxglove.FrameTransform", "ned in map (ENU), vehicle (FRD) in ned", "as the state")
+POSE = FoxgloveChannel("/vehicle/pose", "foxglove.PoseInFrame", "the vehicle's pose in ned", "as the state")
+LOG = FoxgloveChannel("/log", "foxglove.Log", "events, tasks and the autopilot's words to read along", "on change")
+SCENE = FoxgloveChannel("/truth/scene", "foxglove.SceneUpdate", "the simulated conductors and poles", "once")
+
+FOXGLOVE_CHANNELS = (IMAGE, ANNOTATIONS, TRANSFORM, POSE, LOG, SCENE)
+
+
+class RateLimit:
+    """Lets through at most `rate_hz` [1/s, flight] of a stream."""
+
+    def __init__(self, rate_hz: float) -> None:
+        self._period_ns = round(NS_PER_S / rate_hz)
+        self._due_ns: int | None = None
+
+    def admits(self, t_ns: int) -> bool:
+        """Whether the stream's next record, at `t_ns`, is let through."""
+        due_ns = t_ns if self._due_ns is None else self._due_ns
+        if t_ns < due_ns - self._period_ns // 4:  # a source at just this rate may come a little early
+            return False
+        self._due_ns = max(due_ns, t_ns - self._period_ns) + self._period_ns
+        return True
+
+
+CHANNEL_OF = {channel.record: channel for channel in RECORD_CHANNELS}
+CHANNEL_AT = {channel.topic: channel for channel in RECORD_CHANNELS}
+_ADAPTERS: dict[type, TypeAdapter[Any]] = {channel.record: TypeAdapter(channel.record) for channel in RECORD_CHANNELS}
+
+
+def encode(record: object) -> bytes:
+    """Turn a record of the table into JSON, its fields as keys."""
+    return _ADAPTERS[type(record)].dump_json(record)
+
+
+def decode(topic: str, body: bytes) -> Any:
+    """Read back what `encode` made for a topic of RECORD_CHANNELS. Raises ValueError when `body` does not fit."""
+    return _ADAPTERS[CHANNEL_AT[topic].record].validate_json(body)
+
+
+def json_schema(record: type) -> dict[str, Any]:
+    """Describe a record type of the table as a JSON Schema."""
+    return _ADAPTERS[record].json_schema()

@@ -1,0 +1,256 @@
+"""Work out from a flight's records what happened and how well it was flown."""
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from drivers.clock import NS_PER_S
+from mission.log.measures import Floats, line_fit_distances_m, nearest_on_axis, offboard_gaps_s
+from mission.log.reader import Flight
+from mission.records import TaskEnded, TrueLine
+from vision.records import wrap_line_angle_rad
+
+FOLLOW_TASK = "follow_lines"
+UNFINISHED = "unfinished"
+
+
+@dataclass(frozen=True, slots=True)
+class TaskSpan:
+    """A task as flown, flight time [ns]; one that the log does not see end has no `end_ns`."""
+
+    task: str
+    start_ns: int
+    end_ns: int | None
+    result: str
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class TaskSummary:
+    """A task as flown; times [s] from the log's start."""
+
+    task: str
+    start_s: float
+    end_s: float | None
+    result: str
+    reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class LegSummary:
+    """How straight the line was followed: distances [m] of the positions to the straight line that fits them best."""
+
+    task: str
+    n_points: int
+    avg_error_m: float
+    p95_error_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class LateralSummary:
+    """The true horizontal distance [m] from the line's axis while following it."""
+
+    mean_m: float
+    p95_m: float
+    max_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class YawSummary:
+    """The true angle [deg] between heading and line while following it, without sign."""
+
+    median_deg: float
+    p95_deg: float
+
+
+@dataclass(frozen=True, slots=True)
+class Percentiles:
+    """The median and two upper percentiles."""
+
+    p50: float
+    p95: float
+    p99: float
+
+
+@dataclass(frozen=True, slots=True)
+class VisionSummary:
+    """How many frames vision worked on, in how many it saw a line, and how old its news was [ms]."""
+
+    frames: int
+    estimates: int
+    latency_ms: Percentiles | None
+
+
+@dataclass(frozen=True, slots=True)
+class SetpointSummary:
+    """How steadily setpoints were sent while offboard ran; None when fewer than two were."""
+
+    rate_hz: float | None
+    max_gap_ms: float | None
+
+
+@dataclass(frozen=True, slots=True)
+class LandingSummary:
+    """Where the flight ended: horizontal distance [m] from its start, and whether the motors were off."""
+
+    distance_m: float
+    is_disarmed: bool
+
+
+@dataclass(frozen=True, slots=True)
+class EventSummary:
+    """An event; `t_s` [s] from the log's start."""
+
+    t_s: float
+    name: str
+    severity: str
+    message: str
+    reaction: str
+
+
+@dataclass(frozen=True, slots=True)
+class FlightReport:
+    """A flight in figures. `lateral` and `yaw_error` need ground truth, which only a simulated flight has."""
+
+    mission: str
+    result: str
+    reason: str
+    is_truncated: bool
+    duration_s: float
+    tasks: tuple[TaskSummary, ...]
+    legs: tuple[LegSummary, ...]
+    lateral: LateralSummary | None
+    yaw_error: YawSummary | None
+    vision: VisionSummary
+    setpoints: SetpointSummary
+    landing: LandingSummary | None
+    events: tuple[EventSummary, ...]
+
+
+def summarise(flight: Flight) -> FlightReport:
+    """Work out a flight's report."""
+    spans = task_spans(flight)
+    ended = flight.mission_ended
+    end_ns = flight.end_ns if ended is None else ended.t_ns
+
+    def since_start_s(t_ns: int) -> float:
+        return (t_ns - flight.mission.start_ns) / NS_PER_S
+
+    following = [_span_window(span, flight.end_ns) for span in spans if span.task == FOLLOW_TASK]
+    lateral_m, yaw_error_rad = _true_errors(flight, following)
+    return FlightReport(
+        mission=flight.mission.name,
+        result=UNFINISHED if ended is None else str(ended.result),
+        reason="The log breaks off before the mission ended." if ended is None else ended.reason,
+        is_truncated=flight.is_truncated,
+        duration_s=since_start_s(end_ns),
+        tasks=tuple(
+            TaskSummary(
+                span.task,
+                since_start_s(span.start_ns),
+                None if span.end_ns is None else since_start_s(span.end_ns),
+                span.result,
+                span.reason,
+            )
+            for span in spans
+        ),
+        legs=_legs(flight, following),
+        lateral=None
+        if not lateral_m.size
+        else LateralSummary(float(lateral_m.mean()), _percentile(lateral_m, 95), float(lateral_m.max())),
+        yaw_error=None
+        if not yaw_error_rad.size
+        else YawSummary(*(float(np.degrees(_percentile(yaw_error_rad, share))) for share in (50, 95))),
+        vision=_vision(flight),
+        setpoints=_setpoints(flight, [_span_window(span, flight.end_ns) for span in spans]),
+        landing=_landing(flight),
+        events=tuple(
+            EventSummary(since_start_s(event.t_ns), event.name, str(event.severity), event.message, event.reaction)
+            for event in flight.events
+        ),
+    )
+
+
+def to_json(report: FlightReport) -> dict[str, Any]:
+    """Turn a report into plain dicts and lists, ready for json.dump; keys are the records' fields."""
+    return {key: list(value) if isinstance(value, tuple) else value for key, value in asdict(report).items()}
+
+
+def task_spans(flight: Flight) -> tuple[TaskSpan, ...]:
+    """Pair each task's start with its end, in the order flown."""
+    unpaired: list[TaskEnded] = list(flight.tasks_ended)
+    spans = []
+    for started in flight.tasks_started:
+        ended = next((end for end in unpaired if end.index == started.index and end.t_ns >= started.t_ns), None)
+        if ended is None:
+            spans.append(TaskSpan(started.task, started.t_ns, None, UNFINISHED, "The log breaks off before its end."))
+        else:
+            unpaired.remove(ended)
+            spans.append(TaskSpan(started.task, started.t_ns, ended.t_ns, str(ended.result), ended.reason))
+    return tuple(spans)
+
+
+def true_axis(line: TrueLine) -> Floats:
+    """Return the line's axis as an array (m, 2) of north, east [m]."""
+    return np.array(line.axis_ne_m, dtype=np.float64).reshape(-1, 2)
+
+
+def _legs(flight: Flight, following: list[tuple[int, int]]) -> tuple[LegSummary, ...]:
+    # Telemetry that the control loop saw twice is one position.
+    positions = {state.t_ns: (state.north_m, state.east_m, state.down_m) for state in flight.states}
+    legs = []
+    for start_ns, end_ns in following:
+        leg = [position for t_ns, position in positions.items() if start_ns <= t_ns <= end_ns]
+        if len(leg) >= 2:
+            distances_m = line_fit_distances_m(np.array(leg))
+            # Equation 6.5 as printed lacks its 1/N; the figures of table 6.2 are means.
+            legs.append(LegSummary(FOLLOW_TASK, len(leg), float(distances_m.mean()), _percentile(distances_m, 95)))
+    return tuple(legs)
+
+
+def _true_errors(flight: Flight, following: list[tuple[int, int]]) -> tuple[Floats, Floats]:
+    """Distance [m] and angle [rad] to the true line, both without sign, at each true pose of the following tasks."""
+    poses = [pose for pose in flight.truth if any(start <= pose.t_ns <= end for start, end in following)]
+    if flight.line is None or len(flight.line.axis_ne_m) < 2 or not poses:
+        return np.empty(0), np.empty(0)
+    points = np.array([(pose.north_m, pose.east_m) for pose in poses])
+    distance_m, direction_rad = nearest_on_axis(points, true_axis(flight.line))
+    yaw_error_rad = [
+        abs(wrap_line_angle_rad(pose.yaw_rad - direction))
+        for pose, direction in zip(poses, direction_rad.tolist(), strict=True)
+    ]
+    return np.abs(distance_m), np.array(yaw_error_rad)
+
+
+def _vision(flight: Flight) -> VisionSummary:
+    latency_ms = np.array([report.latency_ns for report in flight.reports]) / 1e6
+    return VisionSummary(
+        frames=len(flight.reports),
+        estimates=sum(report.estimate is not None for report in flight.reports),
+        latency_ms=None if not latency_ms.size else Percentiles(*(_percentile(latency_ms, p) for p in (50, 95, 99))),
+    )
+
+
+def _setpoints(flight: Flight, windows: list[tuple[int, int]]) -> SetpointSummary:
+    gaps_s = offboard_gaps_s(np.array([setpoint.t_ns for setpoint in flight.setpoints], dtype=np.int64), windows)
+    if not gaps_s.size:
+        return SetpointSummary(None, None)
+    return SetpointSummary(rate_hz=float(gaps_s.size / gaps_s.sum()), max_gap_ms=float(gaps_s.max() * 1e3))
+
+
+def _landing(flight: Flight) -> LandingSummary | None:
+    track = flight.truth or flight.states
+    if not track or not flight.states:
+        return None
+    first, last = track[0], track[-1]
+    distance_m = float(np.hypot(last.north_m - first.north_m, last.east_m - first.east_m))
+    return LandingSummary(distance_m, not flight.states[-1].is_armed)
+
+
+def _span_window(span: TaskSpan, log_end_ns: int) -> tuple[int, int]:
+    return span.start_ns, log_end_ns if span.end_ns is None else span.end_ns
+
+
+def _percentile(values: Floats, share: float) -> float:
+    return float(np.percentile(values, share))

@@ -1,0 +1,292 @@
+"""The simulated vehicle with its autopilot, PX4 v1.16's behaviour as a model that is only ever stepped.
+
+No sockets, threads or wall clock: time is the autopilot's own, and the same inputs give the same flight.
+"""
+
+import math
+from collections import deque
+from dataclasses import replace
+
+from sitl.battery import Battery
+from sitl.commander import Commander, Failsafe, Observation
+from sitl.control import AttitudeControl, Estimate, PositionControl, Setpoint, attitude_of
+from sitl.estimator import Estimator
+from sitl.flight_tasks import Descend, FlightTask, Hold, Land, Offboard, Return, Takeoff
+from sitl.modes import Answer, Landed, Mode, Severity
+from sitl.parameters import Parameters
+from sitl.place import Home, Origin
+from sitl.takeoff_landing import LandDetector, Ramp, TakeoffRamp
+from sitl.vehicle import Vector, Vehicle, euler_of
+from sitl.wind import Wind
+
+_HOME_S = 1.2  # after boot: the first home
+_NAVIGATOR_S = 0.04  # from a mode change to what PX4's navigator says about it
+
+
+class SimAutopilot:
+    """A vehicle on the ground at the world's origin, and the autopilot that flies it.
+
+    Read `estimate`, `commander`, `landed`, `home`, `battery`, `setpoint`, `thrust`; `vehicle` is the truth.
+    """
+
+    def __init__(
+        self,
+        vehicle: Vehicle | None = None,
+        wind: Wind | None = None,
+        *,
+        seed: int = 0,
+        parameters: Parameters | None = None,
+        origin: Origin | None = None,
+        speed: float = 1.0,
+        is_noisy: bool = True,
+    ) -> None:
+        """Boot. `speed` is how many times faster than the wall clock it will be stepped (see Commander)."""
+        self.vehicle = vehicle or Vehicle()
+        self.wind = wind or Wind(0.0, seed)
+        self.parameters = parameters or Parameters()
+        self.origin = origin or Origin()
+        self.battery = Battery()
+        self.boot_s = 0.0
+        self.commander = Commander(self.parameters, self.say, speed=speed)
+        self._estimator = Estimator(seed, is_noisy=is_noisy)
+        self.estimate: Estimate = self._estimator.step(1e-3, self.vehicle)
+        self.home: Home | None = None
+        self.setpoint: Setpoint | None = None
+        self.thrust = 0.0
+        self._texts: deque[tuple[float, Severity, str]] = deque()
+        self._hover_thrust = self.vehicle.airframe.hover_thrust
+        self._land_detector = LandDetector(self._hover_thrust)
+        self._position_control = PositionControl(self.parameters, self._hover_thrust)
+        self._attitude_control = AttitudeControl(self.parameters)
+        self._was_landing = False
+        self._was_armed = False
+        self._ramp = TakeoffRamp(self.parameters)
+        self._task: FlightTask | None = None
+        self._task_key: object = None
+        self._offboard_target: tuple[Vector, float] | None = None
+        self._setpoint_s: float | None = None
+        self._has_taken_off = False
+        self._takeoff_requests = 0
+
+    # --- what a ground station or an application asks ---
+
+    @property
+    def mode(self) -> Mode:
+        """The mode that is flown."""
+        return self.commander.mode
+
+    @property
+    def is_armed(self) -> bool:
+        """Whether the motors are armed."""
+        return self.commander.is_armed
+
+    @property
+    def failsafe(self) -> Failsafe | None:
+        """Why the autopilot acts against the intended mode; None when it does not."""
+        return self.commander.failsafe
+
+    @property
+    def landed(self) -> Landed:
+        """The landed state, as EXTENDED_SYS_STATE tells it."""
+        if self._land_detector.is_landed:
+            return Landed.ON_GROUND
+        if self.mode is Mode.TAKEOFF:
+            return Landed.TAKEOFF
+        if self._task is not None and self._task.is_landing:
+            return Landed.LANDING
+        return Landed.IN_AIR
+
+    @property
+    def has_seen_setpoints(self) -> bool:
+        """Whether any offboard setpoint ever came."""
+        return self._setpoint_s is not None
+
+    def arm(self) -> Answer:
+        """Arm the motors."""
+        was_armed = self.is_armed
+        answer = self.commander.arm()
+        if self.is_armed and not was_armed:
+            self._set_home()
+            self._has_taken_off = False
+            if self.mode is Mode.TAKEOFF:
+                self._takeoff_requests += 1
+        return answer
+
+    def disarm(self, *, is_forced: bool = False) -> Answer:
+        """Disarm the motors; in the air only when forced."""
+        return self.commander.disarm(is_forced=is_forced)
+
+    def takeoff(self) -> Answer:
+        """Take off to MIS_TAKEOFF_ALT over home; disarmed it waits for arming."""
+        self._takeoff_requests += 1
+        return self.commander.request(Mode.TAKEOFF)
+
+    def land(self) -> Answer:
+        """Land here."""
+        answer = self.commander.request(Mode.LAND)
+        self.say(Severity.INFO, "Landing at current position")
+        return answer
+
+    def set_mode(self, mode: Mode) -> Answer:
+        """Change the flight mode."""
+        if mode is Mode.TAKEOFF:
+            return self.takeoff()
+        return self.commander.request(mode)
+
+    def set_position_setpoint(self, north_m: float, east_m: float, down_m: float, yaw_rad: float) -> None:
+        """Take an offboard setpoint: local NED [m], yaw [rad] (SET_POSITION_TARGET_LOCAL_NED). NaN keeps what is."""
+        n, e, d = self.estimate.position_m
+        target = tuple(
+            actual if math.isnan(wanted) else wanted
+            for wanted, actual in zip((north_m, east_m, down_m), (n, e, d), strict=True)
+        )
+        yaw = euler_of(self.estimate.quaternion)[2] if math.isnan(yaw_rad) else yaw_rad
+        self._offboard_target = ((target[0], target[1], target[2]), yaw)
+        self._setpoint_s = self.boot_s
+        # PX4's commander sees a fresh stream at once: MAVSDK sends a setpoint and the mode change in one go.
+        self.commander.see_setpoint()
+        if isinstance(self._task, Offboard):
+            self._task.aim(*self._offboard_target)
+
+    def set_parameter(self, name: str, value: float | int) -> None:
+        """Write a parameter; raises KeyError and TypeError as Parameters.set does."""
+        self.parameters.set(name, value)
+        self._position_control.tune(self.parameters)
+        self._attitude_control.tune(self.parameters)
+
+    def drain_texts(self) -> list[tuple[Severity, str]]:
+        """The autopilot's status texts since the last call, oldest first."""
+        due = []
+        while self._texts and self._texts[0][0] <= self.boot_s:
+            _, severity, text = self._texts.popleft()
+            due.append((severity, text))
+        return due
+
+    # --- time ---
+
+    def step(self, dt_s: float) -> None:
+        """Let `dt_s` [s] of flight time pass; at most 10 ms for the controllers' sake."""
+        self.boot_s += dt_s
+        vehicle, commander = self.vehicle, self.commander
+        commander.step(self._observation())
+        if self._was_armed and not commander.is_armed:
+            self._set_home()
+        self._was_armed = commander.is_armed
+        self._follow_mode()
+        self._ramp.step(
+            dt_s,
+            is_armed=commander.is_armed,
+            wants_takeoff=self._wants_takeoff(),
+            is_landed=self._land_detector.is_landed,
+        )
+        thrust, torque = self._control(dt_s)
+        self.thrust = thrust
+        air_m_s = self.wind.step(dt_s, vehicle.height_m, math.dist(vehicle.velocity_m_s, (0.0, 0.0, 0.0)))
+        vehicle.step(dt_s, thrust, torque, air_m_s)
+        self.battery.step(dt_s, vehicle.power_w)
+        self.estimate = self._estimator.step(dt_s, vehicle)
+        self._detect_landing(dt_s)
+        if self.home is None and self.boot_s >= _HOME_S:
+            self._set_home()
+
+    def _control(self, dt_s: float) -> tuple[float, Vector]:
+        """Thrust 0 to 1 and torques -1 to 1 of this step."""
+        state = self._ramp.state
+        if state in (Ramp.DISARMED, Ramp.SPOOLUP, Ramp.READY) or self._task is None:
+            self._position_control.reset()
+            self._attitude_control.reset()
+            self.setpoint = None
+            return (0.0 if state is Ramp.DISARMED else 0.001), (0.0, 0.0, 0.0)
+        if state is Ramp.RAMPUP and isinstance(self._task, Takeoff) and self._ramp.max_up_m_s(1.0) < 0.0:
+            self._task.wait()
+        setpoint = self._task.step(dt_s, self.estimate, self.vehicle.height_m)
+        if state is Ramp.RAMPUP:
+            setpoint = replace(setpoint, max_up_m_s=self._ramp.max_up_m_s(setpoint.max_up_m_s))
+        self.setpoint = setpoint
+        if self._land_detector.has_let_go:
+            self._position_control.reset()
+            return self.parameters.get("MPC_THR_MIN"), (0.0, 0.0, 0.0)
+        thrust = self._position_control.step(dt_s, setpoint, self.estimate)
+        wanted = attitude_of(thrust, setpoint.yaw_rad)
+        torque = self._attitude_control.step(dt_s, wanted, self.estimate.quaternion, self.estimate.rates_rad_s)
+        return math.sqrt(thrust[0] ** 2 + thrust[1] ** 2 + thrust[2] ** 2), torque
+
+    def _follow_mode(self) -> None:
+        """Start the flight task of the mode, and go on after a take-off."""
+        if isinstance(self._task, Takeoff) and self._task.is_done and self.mode is Mode.TAKEOFF:
+            self.commander.finish_takeoff()
+        if not self.is_armed:
+            self._task = self._task_key = None
+            return
+        key = (self.mode, self._takeoff_requests if self.mode is Mode.TAKEOFF else 0)
+        if key != self._task_key:
+            self._task_key = key
+            self._task = self._task_of(self.mode)
+
+    def _task_of(self, mode: Mode) -> FlightTask:
+        if mode is Mode.OFFBOARD and self._offboard_target is not None:
+            return Offboard(self.parameters, *self._offboard_target)
+        if mode is Mode.TAKEOFF:
+            altitude_m = self.parameters.get("MIS_TAKEOFF_ALT")
+            self.say(Severity.INFO, f"Using default takeoff altitude: {altitude_m:.1f} m", delay_s=_NAVIGATOR_S)
+            down_m = self.home.position_m[2] - altitude_m if self.home else -altitude_m
+            return Takeoff(self.parameters, self.estimate, min(down_m, self.estimate.position_m[2]))
+        if mode is Mode.RTL and self.home is not None:
+            task = Return(self.parameters, self.estimate, self.home.position_m)
+            home_altitude_m = self.origin.global_of(self.home.position_m)[2]
+            self.say(
+                Severity.INFO,
+                f"RTL: start return at {home_altitude_m + task.return_height_m:.0f} m "
+                f"({task.return_height_m:.0f} m above destination)",
+                delay_s=_NAVIGATOR_S,
+            )
+            return task
+        if mode is Mode.LAND:
+            return Land(self.parameters, self.estimate)
+        if self.commander.is_descending_without_sticks:
+            return Descend(self.parameters, self.estimate)
+        return Hold(self.parameters, self.estimate)
+
+    def _wants_takeoff(self) -> bool:
+        """Whether the task would leave the ground: a take-off, or an offboard setpoint above."""
+        if isinstance(self._task, Offboard) and self._offboard_target is not None:
+            return self._offboard_target[0][2] < self.estimate.position_m[2] - 0.3
+        return isinstance(self._task, Takeoff)
+
+    def _detect_landing(self, dt_s: float) -> None:
+        detector, ramp = self._land_detector, self._ramp.state
+        was_landed, was_landing = detector.is_landed, self._was_landing
+        detector.step(
+            dt_s,
+            is_touching=self.vehicle.is_on_ground,
+            is_ramping=ramp is Ramp.RAMPUP,
+            is_flying=ramp is Ramp.FLIGHT or not self.is_armed,
+            thrust=self.thrust,
+        )
+        self._was_landing = isinstance(self._task, Return) and self._task.is_landing
+        if self._was_landing and not was_landing:
+            self.say(Severity.INFO, "RTL: land at destination")
+        if was_landed and not detector.is_landed:
+            self._has_taken_off = True
+            self.say(Severity.INFO, "Takeoff detected")
+            self._set_home()
+        elif detector.is_landed and not was_landed:
+            self.say(Severity.INFO, "Landing detected")
+
+    def _observation(self) -> Observation:
+        return Observation(
+            boot_s=self.boot_s,
+            setpoint_age_s=None if self._setpoint_s is None else self.boot_s - self._setpoint_s,
+            is_landed=self._land_detector.is_landed,
+            landed_s=self._land_detector.landed_s,
+            has_taken_off=self._has_taken_off,
+            battery=self.battery.remaining,
+        )
+
+    def _set_home(self) -> None:
+        yaw_rad = euler_of(self.estimate.quaternion)[2]
+        self.home = Home(self.estimate.position_m, yaw_rad, self.boot_s)
+
+    def say(self, severity: Severity, text: str, *, delay_s: float = 0.0) -> None:
+        """Send a status text, `delay_s` [s] from now."""
+        self._texts.append((self.boot_s + delay_s, severity, text))

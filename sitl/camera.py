@@ -1,0 +1,106 @@
+"""The simulated camera: looks at the world from where the simulated vehicle truly is."""
+
+import threading
+from types import TracebackType
+from typing import Self
+
+from drivers.camera.camera import CameraError, CameraSettings, Frame
+from drivers.camera.mailbox import Mailbox
+from drivers.clock import NS_PER_S, ScaledClock
+from sitl.lens import CameraMount, pinhole
+from sitl.pose import Pose, PoseBlock
+from sitl.render import Renderer
+from sitl.sensor import Optics
+from sitl.world import WorldError, load_world
+
+_JOIN_S = 5.0
+
+
+class SimCamera:
+    """A camera on the simulated vehicle; it implements drivers.camera's Camera.
+
+    `world` names the world (sitl.world.load_world), `pose_block` the shared memory that the vehicle writes its pose to.
+    Frames come at `settings.rate_hz` of the clock's flight time, as far as the rendering keeps up; those it misses
+    count in `seq`. `seed` is that of the sensor's noise. Entering it paints the world and compiles, which takes
+    seconds, and raises CameraError when the world or the pose block is not there.
+    """
+
+    def __init__(
+        self,
+        world: str | None,
+        pose_block: str,
+        clock: ScaledClock,
+        settings: CameraSettings,
+        hfov_rad: float,
+        seed: int,
+        *,
+        mount: CameraMount | None = None,
+        optics: Optics | None = None,
+    ) -> None:
+        self._world = world
+        self._pose_block = pose_block
+        self._clock = clock
+        self._settings = settings
+        self._intrinsics = pinhole(settings.width_px, settings.height_px, hfov_rad)
+        self._seed = seed
+        self._mount = mount
+        self._optics = optics
+        self._mailbox: Mailbox[Frame] = Mailbox()
+        self._stop = threading.Event()
+        self._thread: threading.Thread | None = None
+
+    def read(self, timeout_s: float) -> Frame | None:
+        """Wait for a frame that was not returned before, and return the newest; None after `timeout_s` [s, wall].
+
+        Raises CameraError when the rendering has failed, EOFError once the camera is closed.
+        """
+        return self._mailbox.get(timeout_s)
+
+    def __enter__(self) -> Self:
+        try:
+            renderer = Renderer(load_world(self._world), self._intrinsics, self._mount, self._optics, self._seed)
+            poses = PoseBlock.attach(self._pose_block)
+        except WorldError as error:
+            raise CameraError(str(error)) from error
+        except FileNotFoundError as error:
+            raise CameraError(
+                f"The simulated camera finds no vehicle: there is no pose block '{self._pose_block}' in shared memory; "
+                "start the simulated vehicle first."
+            ) from error
+        renderer.render(Pose(0, 0.0, 0.0, -1.0, (1.0, 0.0, 0.0, 0.0)), 0)  # compiles, before time counts
+        self._mailbox = Mailbox()
+        self._stop.clear()
+        self._thread = threading.Thread(target=self._grab, args=(renderer, poses), name="sim-camera", daemon=True)
+        self._thread.start()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self._stop.set()
+        if self._thread is not None:
+            self._thread.join(_JOIN_S)
+            self._thread = None
+        self._mailbox.close()
+
+    def _grab(self, renderer: Renderer, poses: PoseBlock) -> None:
+        """Render a frame at each frame time that is not over yet; runs in the grabber thread until told to stop."""
+        period_ns = NS_PER_S / self._settings.rate_hz
+        start_ns = self._clock.now_ns()
+        seq = 0
+        try:
+            while True:
+                early_s = (start_ns + seq * period_ns - self._clock.now_ns()) / NS_PER_S
+                if self._stop.wait(self._clock.wall_s(early_s)):
+                    return
+                pose = poses.read()
+                if pose is not None:
+                    image = renderer.render(pose, seq)
+                    image.flags.writeable = False
+                    self._mailbox.put(Frame(seq, pose.t_ns, image))
+                seq = max(seq + 1, int((self._clock.now_ns() - start_ns) / period_ns) + 1)
+        except Exception as error:
+            # Whatever went wrong in this thread, the reader must hear of it rather than wait for frames for ever.
+            self._mailbox.close(CameraError(f"The simulated camera broke down while rendering: {error!r}."))
+        finally:
+            poses.close()

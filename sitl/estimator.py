@@ -1,0 +1,77 @@
+"""What the autopilot believes about its motion: the truth plus slowly varying, GPS-like errors, the same for a seed."""
+
+import math
+import random
+
+from sitl.control import Estimate, quaternion_of
+from sitl.vehicle import Quaternion, Vector, Vehicle
+
+# Standard deviation and correlation time of each error, of the size that a PX4 v1.16 with GPS shows standing and
+# hovering: decimetres that wander over tens of seconds.
+_POSITION_M = (0.15, 0.15, 0.20)
+_POSITION_S = 15.0
+_POSITION_SMOOTHING_S = 1.0
+_VELOCITY_M_S = (0.06, 0.06, 0.04)
+_VELOCITY_S = 1.5
+_ATTITUDE_RAD = math.radians(0.2)
+_ATTITUDE_S = 3.0
+_RATE_RAD_S = 0.01
+
+
+class Estimator:
+    """Adds errors to the truth. Positions are NED from where the vehicle stood at boot, as the local frame has it."""
+
+    def __init__(self, seed: int, *, is_noisy: bool = True) -> None:
+        """Draw the errors from `seed`; without noise the estimate is the truth."""
+        self._draw = random.Random(f"estimator {seed}")
+        self._is_noisy = is_noisy
+        self._position_raw = [0.0, 0.0, 0.0]
+        self._position = [0.0, 0.0, 0.0]
+        self._velocity = [0.0, 0.0, 0.0]
+        self._attitude = [0.0, 0.0, 0.0]
+
+    def step(self, dt_s: float, vehicle: Vehicle) -> Estimate:
+        """The estimate after `dt_s` [s]."""
+        if not self._is_noisy:
+            return Estimate(
+                vehicle.position_m,
+                vehicle.velocity_m_s,
+                vehicle.acceleration_m_s2,
+                vehicle.quaternion,
+                vehicle.rates_rad_s,
+            )
+        gauss = self._draw.gauss
+        position_drive = math.sqrt(2 * dt_s / _POSITION_S)
+        velocity_drive = math.sqrt(2 * dt_s / _VELOCITY_S)
+        attitude_drive = _ATTITUDE_RAD * math.sqrt(2 * dt_s / _ATTITUDE_S)
+        for axis in range(3):
+            raw = self._position_raw
+            raw[axis] += -raw[axis] * dt_s / _POSITION_S + _POSITION_M[axis] * position_drive * gauss(0.0, 1.0)
+            self._position[axis] += (raw[axis] - self._position[axis]) * dt_s / _POSITION_SMOOTHING_S
+            velocity = self._velocity
+            velocity[axis] += -velocity[axis] * dt_s / _VELOCITY_S
+            velocity[axis] += _VELOCITY_M_S[axis] * velocity_drive * gauss(0.0, 1.0)
+            self._attitude[axis] += -self._attitude[axis] * dt_s / _ATTITUDE_S + attitude_drive * gauss(0.0, 1.0)
+        p, q, r = vehicle.rates_rad_s
+        return Estimate(
+            _sum(vehicle.position_m, self._position),
+            _sum(vehicle.velocity_m_s, self._velocity),
+            vehicle.acceleration_m_s2,
+            self._tilted(vehicle.quaternion),
+            (p + gauss(0.0, _RATE_RAD_S), q + gauss(0.0, _RATE_RAD_S), r + gauss(0.0, _RATE_RAD_S)),
+        )
+
+    def _tilted(self, quaternion: Quaternion) -> Quaternion:
+        """The attitude, turned by the (small) attitude error."""
+        w, x, y, z = quaternion
+        bw, bx, by, bz = quaternion_of(*self._attitude)
+        return (
+            w * bw - x * bx - y * by - z * bz,
+            w * bx + x * bw + y * bz - z * by,
+            w * by - x * bz + y * bw + z * bx,
+            w * bz + x * by - y * bx + z * bw,
+        )
+
+
+def _sum(truth: Vector, error: list[float]) -> Vector:
+    return (truth[0] + error[0], truth[1] + error[1], truth[2] + error[2])

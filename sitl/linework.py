@@ -1,0 +1,110 @@
+"""What of the power line there is to draw: layers of straight members, from the farthest below to the topmost."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sitl.world import Material, World
+
+_SUN_DIAMETER_RAD = math.radians(0.53)
+_PIN_DIAMETER_M = 0.11
+
+_POLE_BGR: dict[Material, tuple[float, float, float]] = {"concrete": (0.47, 0.54, 0.57), "wood": (0.19, 0.26, 0.34)}
+_ARM_BGR = (0.16, 0.21, 0.25)
+_INSULATOR_BGR = (0.20, 0.24, 0.36)
+_ALUMINIUM_BGR = (0.80, 0.79, 0.77)
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Layer:
+    """Members drawn together. What sitl.projection's kernels take; colours are linear light, 0 to 1.
+
+    `members` (n, 9) and `discs` (n, 5) are float64, `material` is (ambient, direct, gloss) as (3,) float64, `bgr` (3,)
+    float64. A shadow's layer darkens what lies below it instead of covering it.
+    """
+
+    members: NDArray[np.float64]
+    discs: NDArray[np.float64]
+    is_ribbon: bool
+    is_shadow: bool
+    material: NDArray[np.float64]
+    bgr: NDArray[np.float64]
+
+
+def build_layers(world: World, wire_at_least_m: float = 0.0) -> list[Layer]:
+    """The world's line as layers, in drawing order.
+
+    A map draws its conductors at least `wire_at_least_m` [m] thick; their shadows keep to the truth.
+    """
+    sun_ned = np.array(world.sun.direction_ned)
+    upright = 0.42 + 0.58 * -sun_ned[2]  # how bright a horizontal face is: sky and sun
+    poles = [[*s.base_ned_m, *s.top_ned_m, s.base_diameter_m, s.top_diameter_m, 1.0] for s in world.supports]
+    tops = [[*s.top_ned_m, s.top_diameter_m, upright] for s in world.supports]
+    arms = [
+        [*s.arm_ends_ned_m[0], *s.arm_ends_ned_m[1], s.arm_thickness_m, s.arm_thickness_m, upright]
+        for s in world.supports
+    ]
+    pins = [
+        [*foot, *top, _PIN_DIAMETER_M, 0.8 * _PIN_DIAMETER_M, 1.0]
+        for s in world.supports
+        for foot, top in s.insulators_ned_m
+    ]
+    pin_tops = [[*top, 0.8 * _PIN_DIAMETER_M, upright] for s in world.supports for _, top in s.insulators_ned_m]
+    wires = [_wire(conductor.points_ned_m, conductor.diameter_m) for conductor in world.conductors]
+    wire = np.concatenate([*wires, np.empty((0, 9))])
+    drawn = wire.copy()
+    drawn[:, 6:8] = np.maximum(wire[:, 6:8], wire_at_least_m)
+
+    bodies = [np.array(rows, dtype=np.float64).reshape(-1, 9) for rows in (poles, arms, pins)]
+    shadows = np.concatenate([cast_shadow(body, sun_ned) for body in (*bodies, wire)])
+    pole_bgr = _POLE_BGR[world.supports[0].material] if world.supports else _POLE_BGR["concrete"]
+    return [
+        _layer(shadows, [], (0.0, 0.0, 0.0), (0.30, 0.24, 0.20), is_ribbon=True, is_shadow=True),
+        _layer(bodies[0], tops, (0.34, 0.66, 0.0), pole_bgr),
+        _layer(bodies[1], [], (0.0, 0.0, 0.0), _ARM_BGR, is_ribbon=True),
+        _layer(bodies[2], pin_tops, (0.40, 0.55, 0.5), _INSULATOR_BGR),
+        _layer(drawn, [], (0.45, 0.55, 0.55), _ALUMINIUM_BGR),
+    ]
+
+
+def cast_shadow(members: NDArray[np.float64], sun_ned: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The shadows (n, 9) that members (n, 9) cast on the plane down = 0, as ribbons whose brightness is their depth.
+
+    The sun is no point: a shadow's edge softens with the distance it falls, and what is thinner than that half-shadow
+    takes only its own part of the sun away. So a ribbon is as wide as the half-shadow and as much fainter.
+    """
+    shadows = members.copy()
+    for start, diameter in ((0, 6), (3, 7)):
+        height_m = np.maximum(0.0, -members[:, start + 2])
+        path_m = height_m / -sun_ned[2]
+        shadows[:, start : start + 2] -= path_m[:, None] * sun_ned[:2]
+        shadows[:, start + 2] = 0.0
+        shadows[:, diameter] = np.maximum(members[:, diameter], path_m * _SUN_DIAMETER_RAD)
+    shadows[:, 8] = (members[:, 6] + members[:, 7]) / (shadows[:, 6] + shadows[:, 7])
+    return shadows
+
+
+def _wire(points_ned_m: NDArray[np.float64], diameter_m: float) -> NDArray[np.float64]:
+    n = len(points_ned_m) - 1
+    return np.hstack([points_ned_m[:-1], points_ned_m[1:], np.full((n, 2), diameter_m), np.ones((n, 1))])
+
+
+def _layer(
+    members: NDArray[np.float64],
+    discs: list[list[float]],
+    material: tuple[float, float, float],
+    bgr: tuple[float, float, float],
+    *,
+    is_ribbon: bool = False,
+    is_shadow: bool = False,
+) -> Layer:
+    return Layer(
+        members=np.ascontiguousarray(members, dtype=np.float64),
+        discs=np.array(discs, dtype=np.float64).reshape(-1, 5),
+        is_ribbon=is_ribbon,
+        is_shadow=is_shadow,
+        material=np.array(material),
+        bgr=np.array(bgr),
+    )

@@ -1,0 +1,244 @@
+"""The simulated autopilot's MAVLink face over UDP: streams out, commands, parameters and setpoints in.
+
+It speaks as PX4's offboard link in SITL does: it sends to the application's port from a port of its own, and answers
+every station that writes to that port. `service` never blocks and knows no time but the autopilot's.
+"""
+
+import math
+import socket
+import struct
+from collections import deque
+from typing import Any
+
+# The whole dialect, MAVLink 2, whatever MAVLINK_DIALECT and MAVLINK20 say; `common` lacks CURRENT_MODE.
+from pymavlink.dialects.v20 import all as dialect
+
+from sitl import commands
+from sitl.autopilot import SimAutopilot
+from sitl.modes import Answer
+from sitl.parameters import Parameter
+from sitl.telemetry import STREAMS, Stream
+
+_OWN_PORT_OFFSET = 40  # PX4: 14580 speaks to 14540
+_FIRST_BEAT_S = 0.24  # after boot; the heartbeat keeps this fraction of each second
+_COMMAND_S = 0.008  # a command waits this long for PX4's commander, in flight time
+_TEXT_CHUNK = 50
+_PARAMETERS_PER_SERVICE = 4
+_SYSTEM, _COMPONENT = 1, 1
+_GET_MESSAGE_INTERVAL, _SET_MESSAGE_INTERVAL, _REQUEST_MESSAGE = 510, 511, 512
+_REQUEST_CAPABILITIES = 520
+_AUTOPILOT_VERSION = 148
+_FLOAT, _INT32 = 9, 6  # MAV_PARAM_TYPE
+_IGNORE_POSITION = 0x7
+
+Address = tuple[str, int]
+
+
+class MavlinkFace:
+    """One autopilot's UDP link. Use it as a context manager, or `close` it."""
+
+    def __init__(self, autopilot: SimAutopilot, port: int, host: str = "127.0.0.1") -> None:
+        """Speak to `host`:`port` from port + 40; raises OSError with a sentence when that port is taken."""
+        self._autopilot = autopilot
+        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        self._socket.setblocking(False)
+        try:
+            self._socket.bind(("127.0.0.1", port + _OWN_PORT_OFFSET))
+        except OSError as error:
+            self._socket.close()
+            raise OSError(
+                f"UDP port {port + _OWN_PORT_OFFSET} for the simulated autopilot is taken; "
+                "end the other simulation or choose another port"
+            ) from error
+        # The application is spoken to unasked, other stations once they were heard.
+        self._stations: list[Address] = [(host, port)]
+        self._mavlink: Any = dialect.MAVLink(None, srcSystem=_SYSTEM, srcComponent=_COMPONENT)
+        self._streams = {stream.message_id: stream for stream in STREAMS}
+        first_s = autopilot.boot_s + _FIRST_BEAT_S
+        self._due_s = {stream.message_id: first_s for stream in STREAMS if stream.rate_hz > 0}
+        self._intervals_s = {stream.message_id: 1 / stream.rate_hz for stream in STREAMS if stream.rate_hz > 0}
+        self._commands: deque[tuple[float, Any, int, tuple[float, ...]]] = deque()
+        self._parameters: deque[Parameter] = deque()
+        self._n_texts = 0
+        self._n_pings = 0
+        self._ping_s = autopilot.boot_s
+
+    def __enter__(self) -> "MavlinkFace":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Let go of the port."""
+        self._socket.close()
+
+    def service(self) -> None:
+        """Read what came, carry out what is due, and send what is due."""
+        self._read()
+        now_s = self._autopilot.boot_s
+        while self._commands and self._commands[0][0] <= now_s:
+            _, message, command, params = self._commands.popleft()
+            self._acknowledge(message, command, self._execute(command, params))
+        for severity, text in self._autopilot.drain_texts():
+            self._send_text(severity, text)
+        for _ in range(min(_PARAMETERS_PER_SERVICE, len(self._parameters))):
+            self._send_parameter(self._parameters.popleft())
+        for message_id, due_s in self._due_s.items():
+            if due_s <= now_s:
+                interval_s = self._intervals_s[message_id]
+                # Keep the rate over jitter, but never make up for missed messages.
+                self._due_s[message_id] = max(due_s + interval_s, now_s)
+                self._send_stream(self._streams[message_id])
+        if self._ping_s <= now_s:
+            self._ping_s = now_s + 1.0
+            self._send(self._mavlink.ping_encode(round(now_s * 1e6), self._n_pings, 0, 0))
+            self._n_pings += 1
+
+    # --- in ---
+
+    def _read(self) -> None:
+        while True:
+            try:
+                data, address = self._socket.recvfrom(65535)
+            except (BlockingIOError, ConnectionRefusedError):
+                return
+            if address not in self._stations:
+                self._stations.append(address)
+            # A datagram holds whole messages, so a broken one must not spoil the next: each gets its own parser.
+            parser: Any = dialect.MAVLink(None)
+            parser.robust_parsing = True
+            for message in parser.parse_buffer(data) or ():
+                self._receive(message)
+
+    def _receive(self, message: Any) -> None:
+        handler = getattr(self, f"_on_{message.get_type().lower()}", None)
+        is_for_us = getattr(message, "target_system", 0) in (0, _SYSTEM) and getattr(
+            message, "target_component", 0
+        ) in (0, _COMPONENT)
+        if handler is not None and is_for_us:
+            handler(message)
+
+    def _on_command_long(self, message: Any) -> None:
+        params = tuple(float(getattr(message, f"param{n}")) for n in range(1, 8))
+        self._take_command(message, params)
+
+    def _on_command_int(self, message: Any) -> None:
+        params = (message.param1, message.param2, message.param3, message.param4, message.x, message.y, message.z)
+        self._take_command(message, tuple(float(value) for value in params))
+
+    def _take_command(self, message: Any, params: tuple[float, ...]) -> None:
+        if message.command == commands.DO_SET_MODE:
+            # PX4's MAVLink module answers at once, its commander again with what came of it.
+            self._acknowledge(message, message.command, Answer.ACCEPTED)
+        self._commands.append((self._autopilot.boot_s + _COMMAND_S, message, message.command, params))
+
+    def _on_set_position_target_local_ned(self, message: Any) -> None:
+        if message.type_mask & _IGNORE_POSITION == 0:
+            self._autopilot.set_position_setpoint(message.x, message.y, message.z, message.yaw)
+
+    def _on_param_request_read(self, message: Any) -> None:
+        try:
+            if message.param_index >= 0:
+                parameter = self._autopilot.parameters.at(message.param_index)
+            else:
+                parameter = self._autopilot.parameters.parameter(message.param_id)
+        except (KeyError, IndexError):
+            return  # PX4 does not answer for what it does not know
+        self._send_parameter(parameter)
+
+    def _on_param_request_list(self, message: Any) -> None:
+        self._parameters = deque(self._autopilot.parameters.all())
+
+    def _on_param_set(self, message: Any) -> None:
+        value: float | int = message.param_value
+        if message.param_type == _INT32:
+            value = struct.unpack("<i", struct.pack("<f", message.param_value))[0]
+        try:
+            self._autopilot.set_parameter(message.param_id, value)
+        except (KeyError, TypeError):
+            return
+        self._send_parameter(self._autopilot.parameters.parameter(message.param_id))
+
+    def _on_ping(self, message: Any) -> None:
+        if message.target_system == 0:
+            sender = message.get_srcSystem(), message.get_srcComponent()
+            self._send(self._mavlink.ping_encode(message.time_usec, message.seq, *sender))
+
+    def _on_timesync(self, message: Any) -> None:
+        if message.tc1 == 0:
+            self._send(self._mavlink.timesync_encode(round(self._autopilot.boot_s * 1e9), message.ts1))
+
+    # --- commands about messages ---
+
+    def _execute(self, command: int, params: tuple[float, ...]) -> Answer:
+        if command == _REQUEST_CAPABILITIES:
+            return self._request_message(_AUTOPILOT_VERSION)
+        if command in (_SET_MESSAGE_INTERVAL, _GET_MESSAGE_INTERVAL, _REQUEST_MESSAGE):
+            message_id = round(params[0]) if math.isfinite(params[0]) else -1
+            if command == _SET_MESSAGE_INTERVAL:
+                return self._set_interval(message_id, params[1])
+            if command == _REQUEST_MESSAGE:
+                return self._request_message(message_id)
+            interval_us = round(self._intervals_s.get(message_id, 0.0) * 1e6)
+            self._send(self._mavlink.message_interval_encode(message_id, interval_us))
+            return Answer.ACCEPTED
+        return commands.execute(self._autopilot, command, params)
+
+    def _set_interval(self, message_id: int, interval_us: float) -> Answer:
+        """Interval [us]; 0 is the default, -1 is off."""
+        stream = self._streams.get(message_id)
+        if stream is None or not math.isfinite(interval_us):
+            return Answer.DENIED
+        default_s = 1 / stream.rate_hz if stream.rate_hz > 0 else 0.0
+        interval_s = interval_us * 1e-6 if interval_us > 0 else default_s if interval_us == 0 else 0.0
+        if interval_s > 0:
+            self._intervals_s[message_id] = interval_s
+            self._due_s[message_id] = self._autopilot.boot_s
+        else:
+            self._intervals_s.pop(message_id, None)
+            self._due_s.pop(message_id, None)
+        return Answer.ACCEPTED
+
+    def _request_message(self, message_id: int) -> Answer:
+        stream = self._streams.get(message_id)
+        return Answer.ACCEPTED if stream is not None and self._send_stream(stream) else Answer.DENIED
+
+    # --- out ---
+
+    def _send(self, message: Any) -> None:
+        data = message.pack(self._mavlink)
+        self._mavlink.seq = (self._mavlink.seq + 1) % 256
+        for station in self._stations:
+            try:
+                self._socket.sendto(data, station)
+            except OSError:
+                continue  # a full queue or a station that went away loses messages, as any UDP link does
+
+    def _send_stream(self, stream: Stream) -> bool:
+        fields = stream.fields(self._autopilot)
+        if fields is None:
+            return False
+        self._send(getattr(self._mavlink, f"{stream.name}_encode")(*fields))
+        return True
+
+    def _send_text(self, severity: int, text: str) -> None:
+        """Send a text as PX4 does: a tab says that it also exists as an event, and 50 characters make a chunk."""
+        data = f"{text}\t".encode("ascii", "replace")
+        for chunk, start in enumerate(range(0, len(data), _TEXT_CHUNK)):
+            piece = data[start : start + _TEXT_CHUNK]
+            self._send(self._mavlink.statustext_encode(int(severity), piece, self._n_texts % 65536, chunk))
+        self._n_texts += 1
+
+    def _send_parameter(self, parameter: Parameter) -> None:
+        value = parameter.value
+        if parameter.is_integer:  # PX4's INT32 travel bytewise in the message's float
+            value = struct.unpack("<f", struct.pack("<i", value))[0]
+        kind = _INT32 if parameter.is_integer else _FLOAT
+        count = len(self._autopilot.parameters)
+        name = parameter.name.encode("ascii")
+        self._send(self._mavlink.param_value_encode(name, value, kind, count, parameter.index))
+
+    def _acknowledge(self, message: Any, command: int, answer: Answer) -> None:
+        sender = message.get_srcSystem(), message.get_srcComponent()
+        self._send(self._mavlink.command_ack_encode(command, int(answer), 0, 0, *sender))

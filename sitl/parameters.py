@@ -1,0 +1,125 @@
+"""The simulated autopilot's parameters: PX4's names, types and defaults, as a ground station reads and writes them."""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Parameter:
+    """One parameter as it stands: `index` is its place in the list, `value` an int where PX4 declares INT32."""
+
+    name: str
+    value: float | int
+    index: int
+
+    @property
+    def is_integer(self) -> bool:
+        """Whether PX4 declares it INT32 (else FLOAT)."""
+        return isinstance(self.value, int)
+
+
+# PX4 v1.16 defaults of the parameters that the model obeys, and of the MAV_ and SYS_ ones that say what it is. A value
+# written as an int is INT32, one written with a point is FLOAT.
+DEFAULTS: dict[str, float | int] = {
+    "BAT_CRIT_THR": 0.07,
+    "BAT_EMERGEN_THR": 0.05,
+    "BAT_LOW_THR": 0.15,
+    "COM_DISARM_LAND": 2.0,
+    "COM_DISARM_PRFLT": 10.0,
+    "COM_FAIL_ACT_T": 5.0,
+    "COM_LOW_BAT_ACT": 3,
+    "COM_OBL_RC_ACT": 0,
+    "COM_OF_LOSS_T": 1.0,
+    "COM_SPOOLUP_TIME": 1.0,
+    "MAV_COMP_ID": 1,
+    "MAV_SYS_ID": 1,
+    "MAV_TYPE": 2,
+    "MC_PITCHRATE_D": 0.003,
+    "MC_PITCHRATE_I": 0.2,
+    "MC_PITCHRATE_MAX": 220.0,
+    "MC_PITCHRATE_P": 0.15,
+    "MC_PITCH_P": 6.5,
+    "MC_ROLLRATE_D": 0.003,
+    "MC_ROLLRATE_I": 0.2,
+    "MC_ROLLRATE_MAX": 220.0,
+    "MC_ROLLRATE_P": 0.15,
+    "MC_ROLL_P": 6.5,
+    "MC_YAWRATE_I": 0.1,
+    "MC_YAWRATE_MAX": 200.0,
+    "MC_YAWRATE_P": 0.2,
+    "MC_YAW_P": 2.8,
+    "MC_YAW_WEIGHT": 0.4,
+    "MIS_TAKEOFF_ALT": 2.5,
+    "MPC_ACC_DOWN_MAX": 3.0,
+    "MPC_ACC_HOR": 3.0,
+    "MPC_ACC_UP_MAX": 4.0,
+    "MPC_JERK_AUTO": 4.0,
+    "MPC_LAND_ALT1": 10.0,
+    "MPC_LAND_ALT2": 5.0,
+    "MPC_LAND_ALT3": 1.0,
+    "MPC_LAND_CRWL": 0.3,
+    "MPC_LAND_SPEED": 0.7,
+    "MPC_THR_MAX": 1.0,
+    "MPC_THR_MIN": 0.12,
+    "MPC_TILTMAX_AIR": 45.0,
+    "MPC_TILTMAX_LND": 12.0,
+    "MPC_TKO_RAMP_T": 3.0,
+    "MPC_TKO_SPEED": 1.5,
+    "MPC_XY_CRUISE": 5.0,
+    "MPC_XY_P": 0.95,
+    "MPC_XY_VEL_D_ACC": 0.2,
+    "MPC_XY_VEL_I_ACC": 0.4,
+    "MPC_XY_VEL_MAX": 12.0,
+    "MPC_XY_VEL_P_ACC": 1.8,
+    "MPC_Z_P": 1.0,
+    "MPC_Z_VEL_D_ACC": 0.0,
+    "MPC_Z_VEL_I_ACC": 2.0,
+    "MPC_Z_VEL_MAX_DN": 1.5,
+    "MPC_Z_VEL_MAX_UP": 3.0,
+    "MPC_Z_VEL_P_ACC": 4.0,
+    "MPC_Z_V_AUTO_DN": 1.5,
+    "MPC_Z_V_AUTO_UP": 3.0,
+    "NAV_ACC_RAD": 10.0,
+    "NAV_MC_ALT_RAD": 0.8,
+    "RTL_CONE_ANG": 45,
+    "RTL_MIN_DIST": 10.0,
+    "RTL_RETURN_ALT": 60.0,
+    "SYS_AUTOSTART": 6001,
+}
+
+
+class Parameters:
+    """The parameters in force. Reading and writing keep PX4's types; an unknown name raises KeyError."""
+
+    def __init__(self, changes: dict[str, float | int] | None = None) -> None:
+        """Take the defaults, and `changes` over them; raises KeyError and TypeError as `set` does."""
+        self._values = dict(DEFAULTS)
+        self._indices = {name: index for index, name in enumerate(sorted(DEFAULTS))}
+        for name, value in (changes or {}).items():
+            self.set(name, value)
+
+    def __len__(self) -> int:
+        return len(self._values)
+
+    def get(self, name: str) -> float:
+        """A parameter's value as a float, for the control laws."""
+        return float(self._values[name])
+
+    def parameter(self, name: str) -> Parameter:
+        """A parameter with its place and type; raises KeyError for a name that PX4's vehicle does not have."""
+        return Parameter(name, self._values[name], self._indices[name])
+
+    def at(self, index: int) -> Parameter:
+        """The parameter at a place in the list; raises IndexError beyond its end."""
+        return self.parameter(sorted(self._values)[index])
+
+    def all(self) -> list[Parameter]:
+        """Every parameter, in the list's order."""
+        return [self.parameter(name) for name in sorted(self._values)]
+
+    def set(self, name: str, value: float | int) -> Parameter:
+        """Write a parameter; raises KeyError for an unknown name, TypeError for the wrong one of int and float."""
+        if isinstance(value, int) != isinstance(self._values[name], int):
+            declared = "INT32" if isinstance(self._values[name], int) else "FLOAT"
+            raise TypeError(f"parameter {name} is {declared}, but got {value!r}; write it in its own type")
+        self._values[name] = value
+        return self.parameter(name)

@@ -1,0 +1,154 @@
+"""Renders what a camera on the vehicle sees of the world."""
+
+import dataclasses
+import functools
+import itertools
+
+import numpy as np
+from numba import njit
+from numpy.typing import NDArray
+
+from drivers.camera.camera import Intrinsics
+from sitl.ground import GroundTexture, GroundView
+from sitl.lens import CameraMount, camera_pose, lens_vector, ray_table
+from sitl.linework import build_layers
+from sitl.pasture import paint_pasture
+from sitl.pose import Pose
+from sitl.projection import clip_to_view, draw_discs, draw_members, project_point
+from sitl.sensor import Optics, blur, develop, fall_off, noise_table, tone_curve
+from sitl.world import World
+
+_REACH = 1.25  # members are drawn this much beyond the image, so that their width cannot be cut off
+
+
+# Painting takes seconds, and all renderers of a process can share the result.
+_paint = functools.lru_cache(maxsize=2)(paint_pasture)
+
+
+def _ground_of(world: World) -> GroundTexture:
+    """Paint the world's ground, or take it from the last time; the painted shadows fall alike at every light level."""
+    return _paint(world.ground, dataclasses.replace(world.sun, level=1.0), world.axis_ne_m)
+
+
+class Renderer:
+    """Renders a world for one camera; the same pose and `seq` give the same image, to the bit.
+
+    `intrinsics` may have distortion; `mount` is where the camera sits on the vehicle; `seed` is the noise's.
+    `wire_at_least_m` is for maps: see sitl.linework.build_layers.
+    """
+
+    def __init__(
+        self,
+        world: World,
+        intrinsics: Intrinsics,
+        mount: CameraMount | None = None,
+        optics: Optics | None = None,
+        seed: int = 0,
+        wire_at_least_m: float = 0.0,
+    ) -> None:
+        self.intrinsics = intrinsics
+        self._world = world
+        self._mount = CameraMount() if mount is None else mount
+        self._optics = Optics() if optics is None else optics
+        self._seed = seed
+        self._layers = build_layers(world, wire_at_least_m)
+        self._sun_ned = np.array(world.sun.direction_ned)
+        self._lens = lens_vector(intrinsics)
+        self._rays = ray_table(intrinsics)
+        self._ground = GroundView(_ground_of(world), self._rays, intrinsics.fx_px)
+        x, y = self._rays
+        self._view = np.array([x.min(), x.max(), y.min(), y.max()], dtype=np.float64)
+        shape = (intrinsics.height_px, intrinsics.width_px)
+        self._light = np.empty((*shape, 3), dtype=np.float32)
+        self._coverage = np.zeros(shape, dtype=np.float32)
+        self._shaded = np.zeros(shape, dtype=np.float32)
+        self._fall_off = fall_off(intrinsics.width_px, intrinsics.height_px, self._optics.corner_light)
+        self._noise = noise_table(seed)
+        self._tone = tone_curve()
+
+    def render(self, pose: Pose, seq: int) -> NDArray[np.uint8]:
+        """The image (height, width, 3) uint8 BGR at a pose; `seq` chooses the noise."""
+        centre, ned_from_camera = camera_pose(pose, self._mount)
+        camera_from_ned = np.ascontiguousarray(ned_from_camera.T)
+        self._ground.draw(self._light, centre, ned_from_camera)
+        for layer in self._layers:
+            n_seen = draw_members(
+                self._coverage,
+                self._shaded,
+                layer.members,
+                layer.is_ribbon,
+                layer.material,
+                self._sun_ned,
+                centre,
+                camera_from_ned,
+                self._lens,
+                _REACH * self._view,
+            )
+            n_seen += draw_discs(self._coverage, self._shaded, layer.discs, centre, camera_from_ned, self._lens)
+            if n_seen:
+                merge_layer(self._light, self._coverage, self._shaded, layer.bgr, layer.is_shadow)
+        light = blur(self._light, self._optics.blur_px)
+        image = np.empty_like(light, dtype=np.uint8)
+        rng = np.random.default_rng((self._seed, seq))
+        row_starts = rng.integers(0, len(self._noise) - 3 * image.shape[1], len(image))
+        develop(
+            light.reshape(len(light), -1),
+            self._fall_off,
+            self._world.sun.level,
+            self._optics.read_noise,
+            self._optics.shot_noise,
+            self._noise,
+            row_starts,
+            self._tone,
+            image.reshape(len(image), -1),
+        )
+        return image
+
+    def project(self, pose: Pose) -> list[NDArray[np.float64]]:
+        """Where the conductors truly are in the image at a pose.
+
+        Returns for each conductor its visible part as (n, 4) float64 [px]: x1, y1, x2, y2 of straight pieces in the
+        conductor's order, the centre of the first pixel at (0, 0); none of them where it is out of view.
+        """
+        centre, ned_from_camera = camera_pose(pose, self._mount)
+        pieces = []
+        for conductor in self._world.conductors:
+            points = (conductor.points_ned_m - centre) @ ned_from_camera
+            rows = []
+            for p, q in itertools.pairwise(points):
+                first, last = clip_to_view(p, q, self._view)
+                if first < last:
+                    a, b = p + first * (q - p), p + last * (q - p)
+                    rows.append([*project_point(*a, self._lens), *project_point(*b, self._lens)])
+            pieces.append(np.array(rows, dtype=np.float64).reshape(-1, 4))
+        return pieces
+
+
+@njit(nogil=True, cache=True)  # type: ignore[untyped-decorator]
+def merge_layer(
+    light: NDArray[np.float32],
+    coverage: NDArray[np.float32],
+    shaded: NDArray[np.float32],
+    bgr: NDArray[np.float64],
+    is_shadow: bool,
+) -> None:
+    """Blend a layer of colour `bgr` (3,) into `light` (height, width, 3), in linear light, and empty it.
+
+    `coverage` and `shaded` are (height, width) float32 as add_strip leaves them. Where pieces overlap, the coverage
+    adds up to more than 1 and counts as 1. A shadow's `bgr` is the light that is left where it is full.
+    """
+    for v in range(coverage.shape[0]):
+        for u in range(coverage.shape[1]):
+            part = coverage[v, u]
+            if part == 0.0:
+                continue
+            bright = shaded[v, u]
+            if part > 1.0:
+                bright /= part
+                part = np.float32(1.0)
+            coverage[v, u] = shaded[v, u] = 0.0
+            for c in range(3):
+                if is_shadow:
+                    light[v, u, c] *= np.float32(1.0 - min(1.0, bright) * (1.0 - bgr[c]))
+                else:
+                    light[v, u, c] = np.float32(light[v, u, c] * (1.0 - part) + bright * bgr[c])

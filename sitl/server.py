@@ -1,0 +1,97 @@
+"""Runs the simulated vehicle in its own process: steps it in time with the flight's clock, and serves its MAVLink."""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+from drivers.clock import NS_PER_S, ScaledClock
+from sitl.autopilot import SimAutopilot
+from sitl.mavlink import MavlinkFace
+from sitl.place import Origin
+from sitl.pose import Pose, PoseBlock
+from sitl.vehicle import Vehicle
+from sitl.wind import Wind
+
+_STEP_NS = 4_000_000  # 250 Hz of flight time
+_STEP_S = _STEP_NS / NS_PER_S
+_MAX_BURST = 50  # steps without a look at the clock; more debt than a second of wall time is forgiven
+_FORGIVE_WALL_NS = NS_PER_S // 4
+
+
+@dataclass(frozen=True, slots=True)
+class SitlSettings:
+    """How the simulated vehicle is run.
+
+    `port` is the application's UDP port; `wind_m_s` the mean wind at 20 ft, whose direction `seed` draws;
+    `start_yaw_rad` the heading at start; latitude, longitude and altitude place the world's NED origin, where the
+    vehicle stands at start; `pose_block` names the shared memory that gets the true pose (None: nobody looks).
+    """
+
+    port: int
+    seed: int
+    wind_m_s: float
+    clock: ScaledClock
+    start_yaw_rad: float
+    latitude_deg: float
+    longitude_deg: float
+    altitude_m: float
+    pose_block: str | None
+
+
+@dataclass(frozen=True, slots=True)
+class SitlSummary:
+    """How much flight was simulated [s], in how much wall time [s], and so how fast."""
+
+    simulated_s: float
+    wall_s: float
+
+    @property
+    def achieved_speed(self) -> float:
+        """Flight time over wall time; below the clock's speed where the machine was too slow."""
+        return self.simulated_s / self.wall_s if self.wall_s > 0 else 0.0
+
+
+def run(settings: SitlSettings, should_stop: Callable[[], bool]) -> SitlSummary:
+    """Fly until `should_stop` says so. Raises OSError when the port is taken, FileNotFoundError without a pose block.
+
+    Steps 4 ms of flight time, paced by the clock. When late it catches up; debt beyond a quarter of a second of wall
+    time is forgiven, and shows in the summary's speed.
+    """
+    clock = settings.clock
+    autopilot = SimAutopilot(
+        Vehicle(yaw_rad=settings.start_yaw_rad),
+        Wind(settings.wind_m_s, settings.seed),
+        seed=settings.seed,
+        origin=Origin(settings.latitude_deg, settings.longitude_deg, settings.altitude_m),
+        speed=max(1.0, clock.speed),
+    )
+    pose_block = PoseBlock.attach(settings.pose_block) if settings.pose_block is not None else None
+    forgive_ns = round(_FORGIVE_WALL_NS * clock.speed)
+    n_steps = 0
+    try:
+        with MavlinkFace(autopilot, settings.port) as face:
+            began_s = time.monotonic()
+            flight_ns = clock.now_ns()
+            while not should_stop():
+                now_ns = clock.now_ns()
+                if now_ns - flight_ns > forgive_ns:
+                    flight_ns = now_ns - forgive_ns
+                for _ in range(min(_MAX_BURST, (now_ns - flight_ns) // _STEP_NS)):
+                    autopilot.step(_STEP_S)
+                    face.service()
+                    flight_ns += _STEP_NS
+                    n_steps += 1
+                    if pose_block is not None:
+                        pose_block.write(_pose(autopilot.vehicle, flight_ns))
+                ahead_ns = flight_ns + _STEP_NS - clock.now_ns()
+                if ahead_ns > 0:
+                    time.sleep(clock.wall_s(ahead_ns / NS_PER_S))
+            return SitlSummary(n_steps * _STEP_S, time.monotonic() - began_s)
+    finally:
+        if pose_block is not None:
+            pose_block.close()
+
+
+def _pose(vehicle: Vehicle, t_ns: int) -> Pose:
+    n, e, d = vehicle.position_m
+    return Pose(t_ns, n, e, d, vehicle.quaternion)

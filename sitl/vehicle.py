@@ -1,0 +1,173 @@
+"""A multirotor's rigid body: thrust and torques in, motion out.
+
+World NED, body FRD, quaternion (w, x, y, z) ned_from_frd. Plain floats: a step has to take tens of microseconds.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+
+GRAVITY_M_S2 = 9.80665
+
+Vector = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
+GroundHeight = Callable[[float, float], float]
+"""(north, east) [m] -> down [m] of the ground."""
+
+
+def flat_ground(north_m: float, east_m: float) -> float:
+    """Ground at down = 0 everywhere [m]."""
+    return 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Airframe:
+    """What a multirotor is made of; the default is a hexacopter of the DJI F550's class, loaded with a camera.
+
+    `max_thrust_n` is all motors together; `max_torque_n_m` what they give about body x, y, z around hover. Drag against
+    the air is a = -(linear + quadratic * |v|) v: rotors give the linear part, frame and payload the quadratic one;
+    at 45 degrees of tilt it makes 12 m/s. `disk_area_m2` and `figure_of_merit` set the power that thrust costs
+    (momentum theory).
+    """
+
+    mass_kg: float = 2.4
+    inertia_kg_m2: Vector = (0.030, 0.030, 0.050)
+    max_thrust_n: float = 48.0
+    max_torque_n_m: Vector = (4.4, 4.4, 0.55)
+    motor_time_constant_s: float = 0.05
+    linear_drag_1_s: float = 0.60
+    quadratic_drag_1_m: float = 0.02
+    rotational_drag_n_m_s: Vector = (0.02, 0.02, 0.05)
+    disk_area_m2: float = 6 * math.pi * (0.239 / 2) ** 2
+    figure_of_merit: float = 0.42
+
+    @property
+    def hover_thrust(self) -> float:
+        """The part of the full thrust that hovers, 0 to 1."""
+        return self.mass_kg * GRAVITY_M_S2 / self.max_thrust_n
+
+
+class Vehicle:
+    """The moving body. `step` is deterministic: the same inputs give the same motion.
+
+    Attributes are the true state: position NED [m], velocity NED [m/s], acceleration NED [m/s2], `quaternion`
+    ned_from_frd, `rates_rad_s` body FRD, `thrust_n` now, `is_on_ground`.
+    """
+
+    __slots__ = (
+        "_torque_n_m",
+        "acceleration_m_s2",
+        "airframe",
+        "ground",
+        "is_on_ground",
+        "position_m",
+        "quaternion",
+        "rates_rad_s",
+        "thrust_n",
+        "velocity_m_s",
+    )
+
+    def __init__(
+        self, airframe: Airframe | None = None, *, yaw_rad: float = 0.0, ground: GroundHeight = flat_ground
+    ) -> None:
+        """Stand on the ground at the world's origin, heading `yaw_rad`."""
+        self.airframe = airframe or Airframe()
+        self.ground = ground
+        self.position_m: Vector = (0.0, 0.0, ground(0.0, 0.0))
+        self.velocity_m_s: Vector = (0.0, 0.0, 0.0)
+        self.acceleration_m_s2: Vector = (0.0, 0.0, 0.0)
+        self.quaternion: Quaternion = (math.cos(yaw_rad / 2), 0.0, 0.0, math.sin(yaw_rad / 2))
+        self.rates_rad_s: Vector = (0.0, 0.0, 0.0)
+        self.thrust_n = 0.0
+        self._torque_n_m: Vector = (0.0, 0.0, 0.0)
+        self.is_on_ground = True
+
+    @property
+    def euler_rad(self) -> Vector:
+        """Roll, pitch, yaw [rad]."""
+        return euler_of(self.quaternion)
+
+    @property
+    def height_m(self) -> float:
+        """Height over the ground below [m]."""
+        return self.ground(self.position_m[0], self.position_m[1]) - self.position_m[2]
+
+    @property
+    def power_w(self) -> float:
+        """Electrical power that the motors draw: T^1.5 / sqrt(2 rho A) over the figure of merit [W]."""
+        ideal_w: float = self.thrust_n**1.5 / math.sqrt(2 * 1.225 * self.airframe.disk_area_m2)
+        return ideal_w / self.airframe.figure_of_merit
+
+    def step(self, dt_s: float, thrust: float, torque: Vector, wind_m_s: Vector) -> None:
+        """Move on by `dt_s` [s] (semi-implicit Euler; 4 ms is small against every time constant here).
+
+        `thrust` 0 to 1 and `torque` -1 to 1 about body x, y, z are what the autopilot asks of the motors; they are
+        clipped to what the motors can give and lag behind. `wind_m_s` is the air's velocity NED.
+        """
+        frame = self.airframe
+        lag = dt_s / (frame.motor_time_constant_s + dt_s)
+        self.thrust_n += lag * (min(max(thrust, 0.0), 1.0) * frame.max_thrust_n - self.thrust_n)
+        # Torque comes from thrust differences: near zero and near full thrust none is left.
+        share = self.thrust_n / frame.max_thrust_n
+        authority = min(1.0, 4.0 * share, 4.0 * (1.02 - share))
+        tx, ty, tz = self._torque_n_m
+        mx, my, mz = frame.max_torque_n_m
+        tx += lag * (min(max(torque[0], -authority), authority) * mx - tx)
+        ty += lag * (min(max(torque[1], -authority), authority) * my - ty)
+        tz += lag * (min(max(torque[2], -authority), authority) * mz - tz)
+        self._torque_n_m = (tx, ty, tz)
+
+        w, x, y, z = self.quaternion
+        # Third column of the rotation matrix: body z (down) in NED.
+        zn, ze, zd = 2 * (x * z + w * y), 2 * (y * z - w * x), 1 - 2 * (x * x + y * y)
+        vn, ve, vd = self.velocity_m_s
+        an, ae, ad = vn - wind_m_s[0], ve - wind_m_s[1], vd - wind_m_s[2]
+        drag = frame.linear_drag_1_s + frame.quadratic_drag_1_m * math.sqrt(an * an + ae * ae + ad * ad)
+        lift = self.thrust_n / frame.mass_kg
+        acceleration = (-drag * an - lift * zn, -drag * ae - lift * ze, -drag * ad - lift * zd + GRAVITY_M_S2)
+        n, e, d = self.position_m
+        ground_m = self.ground(n, e)
+        if d >= ground_m and acceleration[2] >= 0.0:
+            self._rest(ground_m)
+            return
+        vn, ve, vd = vn + acceleration[0] * dt_s, ve + acceleration[1] * dt_s, vd + acceleration[2] * dt_s
+        self.acceleration_m_s2 = acceleration
+        self.velocity_m_s = (vn, ve, vd)
+        self.position_m = (n + vn * dt_s, e + ve * dt_s, d + vd * dt_s)
+        self.is_on_ground = False
+
+        p, q, r = self.rates_rad_s
+        ix, iy, iz = frame.inertia_kg_m2
+        dx, dy, dz = frame.rotational_drag_n_m_s
+        p += dt_s * (tx - dx * p - (iz - iy) * q * r) / ix
+        q += dt_s * (ty - dy * q - (ix - iz) * r * p) / iy
+        r += dt_s * (tz - dz * r - (iy - ix) * p * q) / iz
+        self.rates_rad_s = (p, q, r)
+        half = 0.5 * dt_s
+        w, x, y, z = (
+            w - half * (x * p + y * q + z * r),
+            x + half * (w * p + y * r - z * q),
+            y + half * (w * q - x * r + z * p),
+            z + half * (w * r + x * q - y * p),
+        )
+        norm = 1.0 / math.sqrt(w * w + x * x + y * y + z * z)
+        self.quaternion = (w * norm, x * norm, y * norm, z * norm)
+
+    def _rest(self, ground_m: float) -> None:
+        """Stand on the gear: no motion, level, heading kept."""
+        yaw_rad = self.euler_rad[2]
+        self.position_m = (self.position_m[0], self.position_m[1], ground_m)
+        self.velocity_m_s = self.acceleration_m_s2 = self.rates_rad_s = (0.0, 0.0, 0.0)
+        self._torque_n_m = (0.0, 0.0, 0.0)
+        self.quaternion = (math.cos(yaw_rad / 2), 0.0, 0.0, math.sin(yaw_rad / 2))
+        self.is_on_ground = True
+
+
+def euler_of(quaternion: Quaternion) -> Vector:
+    """Roll, pitch, yaw [rad] (rotations about z, then y, then x) of a unit quaternion ned_from_frd."""
+    w, x, y, z = quaternion
+    return (
+        math.atan2(2 * (w * x + y * z), 1 - 2 * (x * x + y * y)),
+        math.asin(min(1.0, max(-1.0, 2 * (w * y - z * x)))),
+        math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z)),
+    )

@@ -1,0 +1,114 @@
+"""Wind: a constant mean and MIL-F-8785C low-altitude Dryden gusts, the same for the same seed."""
+
+import math
+import random
+from dataclasses import dataclass
+
+_FEET_PER_M = 1 / 0.3048
+_REFERENCE_HEIGHT_M = 20 * 0.3048  # W20 is the wind at 20 ft
+
+
+@dataclass(frozen=True, slots=True)
+class GustScales:
+    """Dryden's lengths [m] and standard deviations [m/s] along (u), across (v) and vertical to (w) the mean wind."""
+
+    length_u_m: float
+    length_v_m: float
+    length_w_m: float
+    sigma_u_m_s: float
+    sigma_v_m_s: float
+    sigma_w_m_s: float
+
+
+def gust_scales(height_m: float, wind_20ft_m_s: float) -> GustScales:
+    """Scales of MIL-F-8785C 3.7.3.4 for a height over the ground [m] and the mean wind at 20 ft, W20 [m/s].
+
+    The specification holds from 10 to 1000 ft; outside, its value at the nearer end is taken.
+    """
+    height_ft = min(max(height_m * _FEET_PER_M, 10.0), 1000.0)
+    factor = 0.177 + 0.000823 * height_ft
+    length_m = height_ft / factor**1.2 / _FEET_PER_M
+    sigma_w_m_s = 0.1 * wind_20ft_m_s
+    sigma_m_s = sigma_w_m_s / factor**0.4
+    return GustScales(length_m, length_m, height_ft / _FEET_PER_M, sigma_m_s, sigma_m_s, sigma_w_m_s)
+
+
+class _SecondOrder:
+    """White noise through (1 + sqrt(3) T s) / (1 + T s)^2, Dryden's lateral and vertical form, of unit deviation.
+
+    Two chained first-order lags, each advanced exactly over the step. For white noise that drives the first lag to unit
+    variance, their covariance is x1x1 = 1, x1x2 = x2x2 = 1/2, and the output c1 x1 + c2 x2 has unit variance with
+    c1 = sqrt(3/2), c2 = (1 - sqrt(3)) / sqrt(2).
+    """
+
+    __slots__ = ("_noise", "_x1", "_x2")
+    _C1 = math.sqrt(3 / 2)
+    _C2 = (1 - math.sqrt(3)) / math.sqrt(2)
+
+    def __init__(self, noise: random.Random) -> None:
+        self._noise = noise
+        self._x1 = noise.gauss(0.0, 1.0)
+        self._x2 = 0.5 * self._x1 + 0.5 * noise.gauss(0.0, 1.0)
+
+    def step(self, ratio: float) -> float:
+        """Advance by `ratio` = dt / T; returns the gust in units of its deviation."""
+        decay = math.exp(-ratio)
+        before = self._x1
+        self._x1 = decay * before + math.sqrt(1 - decay * decay) * self._noise.gauss(0.0, 1.0)
+        self._x2 = decay * self._x2 + (1 - decay) * 0.5 * (before + self._x1)
+        return self._C1 * self._x1 + self._C2 * self._x2
+
+
+class _FirstOrder:
+    """White noise through 1 / (1 + T s), Dryden's longitudinal form, of unit deviation."""
+
+    __slots__ = ("_noise", "_x")
+
+    def __init__(self, noise: random.Random) -> None:
+        self._noise = noise
+        self._x = noise.gauss(0.0, 1.0)
+
+    def step(self, ratio: float) -> float:
+        """Advance by `ratio` = dt / T; returns the gust in units of its deviation."""
+        decay = math.exp(-ratio)
+        self._x = decay * self._x + math.sqrt(1 - decay * decay) * self._noise.gauss(0.0, 1.0)
+        return self._x
+
+
+class Wind:
+    """The air's velocity where the vehicle is.
+
+    `speed_m_s` is the mean at 20 ft; with height it follows the logarithmic profile of MIL-F-8785C 3.7.3.4
+    (roughness 0.15 ft). `from_rad` is where it blows from, clockwise from north; None draws it from `seed`.
+    """
+
+    def __init__(self, speed_m_s: float, seed: int, from_rad: float | None = None) -> None:
+        """Raises ValueError when `speed_m_s` is negative."""
+        if speed_m_s < 0:
+            raise ValueError(f"wind speed is {speed_m_s} m/s; give 0 or more, and its direction apart")
+        draw = random.Random(f"wind {seed}")
+        self.speed_m_s = speed_m_s
+        self.from_rad = draw.uniform(-math.pi, math.pi) if from_rad is None else from_rad
+        self._along = (-math.cos(self.from_rad), -math.sin(self.from_rad))
+        self._u = _FirstOrder(draw)
+        self._v = _SecondOrder(draw)
+        self._w = _SecondOrder(draw)
+
+    def mean_m_s(self, height_m: float) -> float:
+        """Mean wind at a height over the ground [m]; below 3 ft it is that of 3 ft."""
+        roughness_m = 0.15 * 0.3048
+        height_m = max(height_m, 3 * 0.3048)
+        return self.speed_m_s * math.log(height_m / roughness_m) / math.log(_REFERENCE_HEIGHT_M / roughness_m)
+
+    def step(self, dt_s: float, height_m: float, airspeed_m_s: float) -> tuple[float, float, float]:
+        """The air's velocity NED [m/s] after `dt_s`; gusts drift past at `airspeed_m_s`, at least at the mean wind."""
+        if self.speed_m_s == 0.0:
+            return (0.0, 0.0, 0.0)
+        scales = gust_scales(height_m, self.speed_m_s)
+        mean_m_s = self.mean_m_s(height_m)
+        travelled_m = max(airspeed_m_s, mean_m_s) * dt_s
+        u = mean_m_s + scales.sigma_u_m_s * self._u.step(travelled_m / scales.length_u_m)
+        v = scales.sigma_v_m_s * self._v.step(travelled_m / scales.length_v_m)
+        w = scales.sigma_w_m_s * self._w.step(travelled_m / scales.length_w_m)
+        north, east = self._along
+        return (u * north - v * east, u * east + v * north, w)

@@ -1,0 +1,309 @@
+"""What is recorded is read back: every record type, damaged and cut files, and disks that fail."""
+
+import hashlib
+import os
+import subprocess
+import sys
+import time
+from dataclasses import fields, replace
+from datetime import UTC, datetime, timedelta, timezone
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from mcap.reader import make_reader
+
+from drivers.clock import NS_PER_S
+from mission.autopilot import Setpoint, VehicleState
+from mission.log import channels
+from mission.log.backlog import Backlog
+from mission.log.disk import log_path
+from mission.log.reader import Flight, read_flight
+from mission.log.recorder import Recorder
+from mission.log.records import LogError, SentSetpoint, StatusText
+from mission.records import Event, MissionEnded, Severity, TaskEnded, TaskStarted, TruePose
+from mission.safety import Hazard, Reaction
+from tests.log import synthetic_flight
+from tests.log.synthetic_flight import LINE, MISSION_TEXT, START_NS, TICK_NS, FixedClock, fly, put_down, write_log
+from vision.records import VisionReport
+
+DEADLINE_S = 60.0
+
+
+@pytest.fixture(scope="module")
+def flown() -> list[tuple[int, object]]:
+    return list(fly())
+
+
+@pytest.fixture(scope="module")
+def log(flown: list[tuple[int, object]], tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("logs") / "flight.mcap"
+    assert write_log(path, flown).failure is None
+    return path
+
+
+def of_type(flown: list[tuple[int, object]], kind: type) -> tuple[object, ...]:
+    return tuple(item for _, item in flown if type(item) is kind)
+
+
+def test_every_record_comes_back_as_it_was(flown: list[tuple[int, object]], log: Path) -> None:
+    flight = read_flight(log)
+    assert flight.states == of_type(flown, VehicleState)
+    assert flight.tasks_started == of_type(flown, TaskStarted)
+    assert flight.tasks_ended == of_type(flown, TaskEnded)
+    assert (flight.mission_ended,) == of_type(flown, MissionEnded)
+    assert flight.events == of_type(flown, Event)
+    assert flight.truth == of_type(flown, TruePose)
+    assert flight.line == LINE
+    sent = [(t_ns, item) for t_ns, item in flown if isinstance(item, Setpoint)]
+    assert flight.setpoints == tuple(SentSetpoint(t, s.north_m, s.east_m, s.down_m, s.yaw_rad) for t, s in sent)
+    assert not flight.is_truncated
+
+
+def test_vision_reports_come_back_with_their_images_when_asked(flown: list[tuple[int, object]], log: Path) -> None:
+    reported = [item for _, item in flown if isinstance(item, VisionReport)]
+    assert sum(report.jpeg is not None for report in reported) > 10
+    for with_images in (False, True):
+        reports = read_flight(log, with_images=with_images).reports
+        for before, after in zip(reported, reports, strict=True):
+            np.testing.assert_allclose(after.power_lines, before.power_lines, atol=0.005)
+            assert not after.power_lines.flags.writeable
+            for field in fields(VisionReport):
+                if field.name not in ("power_lines", "jpeg"):
+                    assert getattr(after, field.name) == getattr(before, field.name)
+            assert after.jpeg == (before.jpeg if with_images else None)
+
+
+def test_the_mission_file_and_the_metadata_are_in_the_log(log: Path) -> None:
+    mission = read_flight(log).mission
+    assert (mission.name, mission.text, mission.start_ns) == ("follow_line", MISSION_TEXT, START_NS)
+    assert mission.sha256 == hashlib.sha256(MISSION_TEXT.encode()).hexdigest()
+    assert mission.metadata == {"vehicle": "none"}
+
+
+def test_log_time_is_unix_time(tmp_path: Path) -> None:
+    before_ns = time.time_ns()
+    write_log(tmp_path / "a.mcap", [(START_NS, Event(START_NS + 5, "x", Severity.INFO, "y"))])
+    with (tmp_path / "a.mcap").open("rb") as file:
+        (time_ns,) = (message.log_time for _, _, message in make_reader(file).iter_messages(["/event"]))
+    assert before_ns < time_ns < time.time_ns() + NS_PER_S
+
+
+def test_the_log_holds_the_channels_of_the_table_with_their_schemas(log: Path) -> None:
+    with log.open("rb") as file:
+        summary = make_reader(file).get_summary()
+    assert summary is not None
+    found = {channel.topic: summary.schemas[channel.schema_id] for channel in summary.channels.values()}
+    unused = {"/status_text"}
+    for channel in channels.RECORD_CHANNELS:
+        if channel.topic not in unused:
+            assert found[channel.topic].encoding == "jsonschema"
+            assert found[channel.topic].name == f"lineflight.{channel.record.__name__}"
+    for viewer_channel in channels.FOXGLOVE_CHANNELS:
+        assert found[viewer_channel.topic].name == viewer_channel.schema
+    assert len(found) == len(channels.RECORD_CHANNELS) + len(channels.FOXGLOVE_CHANNELS) - len(unused)
+
+
+def test_units_stand_in_the_schema() -> None:
+    properties = channels.json_schema(VehicleState)["properties"]
+    assert {"t_ns", "north_m", "v_down_m_s", "yaw_rad", "is_armed"} <= properties.keys()
+
+
+st.register_type_strategy(float, st.floats(allow_nan=False, allow_infinity=False))
+
+
+@settings(deadline=None)
+@given(st.builds(VehicleState) | st.builds(TaskEnded) | st.builds(Event) | st.builds(StatusText) | st.builds(TruePose))
+def test_any_record_survives_json(record: object) -> None:
+    topic = channels.CHANNEL_OF[type(record)].topic
+    assert channels.decode(topic, channels.encode(record)) == record
+
+
+@settings(max_examples=30, deadline=None)
+@given(st.integers(10, 200), st.floats(0.0, 0.2), st.randoms(use_true_random=False))
+def test_a_rate_limit_keeps_the_rate_whatever_comes(source_hz: int, jitter: float, random) -> None:
+    limit = channels.RateLimit(20.0)
+    period_ns = NS_PER_S // source_hz
+    times_ns = [tick * period_ns + round(random.uniform(-jitter, jitter) * period_ns) for tick in range(10 * source_hz)]
+    kept = sum(limit.admits(t_ns) for t_ns in times_ns)
+    assert kept <= 10 * 20 + 2
+    assert kept >= 10 * min(20, source_hz) * 0.95
+
+
+def test_true_poses_are_thinned(tmp_path: Path) -> None:
+    poses = [(0, TruePose(START_NS + tick * NS_PER_S // 100, 0.0, 0.0, 0.0, 0.0)) for tick in range(1_000)]
+    write_log(tmp_path / "a.mcap", poses)
+    assert len(read_flight(tmp_path / "a.mcap").truth) == pytest.approx(200, abs=1)
+
+
+def check_is_beginning(part: Flight, whole: Flight) -> None:
+    assert part.is_truncated
+    for field in ("states", "setpoints", "tasks_started", "tasks_ended", "events", "truth"):
+        records = getattr(part, field)
+        assert records == getattr(whole, field)[: len(records)]
+
+
+def test_a_log_cut_anywhere_is_read_up_to_the_cut(log: Path, tmp_path: Path) -> None:
+    whole, data = read_flight(log), log.read_bytes()
+    part_path = tmp_path / "part.mcap"
+    n_states = []
+    for length in np.linspace(len(data) - 1, 9, 40).astype(int).tolist():
+        part_path.write_bytes(data[:length])
+        try:
+            part = read_flight(part_path, with_images=True)
+        except LogError as error:
+            assert "cut off at its very start" in str(error)  # noqa: PT017
+            n_states.append(0)
+            continue
+        check_is_beginning(part, whole)
+        n_states.append(len(part.states))
+    assert n_states == sorted(n_states, reverse=True)
+    assert n_states[0] == len(whole.states)
+    assert len(set(n_states)) > 10
+
+
+WRITE_FOREVER = """
+import threading
+from pathlib import Path
+import sys
+from tests.log.synthetic_flight import *
+records = list(fly(image_period_s=1.0))[:1000]
+recorder = Recorder(Path(sys.argv[1]), mission_text=MISSION_TEXT, mission_name="m", metadata={}, clock=FixedClock())
+recorder.__enter__()
+for t_ns, item in records:
+    put_down(recorder, t_ns, item)
+threading.Event().wait()
+"""
+
+
+def child_environment() -> dict[str, str]:
+    root = Path(synthetic_flight.__file__).parents[2]
+    return {**os.environ, "PYTHONPATH": str(root)}
+
+
+def test_a_killed_program_leaves_what_it_recorded(flown: list[tuple[int, object]], tmp_path: Path) -> None:
+    path = tmp_path / "killed.mcap"
+    expected = of_type(flown[:1000], VehicleState)
+    with subprocess.Popen([sys.executable, "-c", WRITE_FOREVER, str(path)], env=child_environment()) as writer:
+        deadline_s = time.monotonic() + DEADLINE_S
+        n_read = 0
+        # The program never closes its log: what can be read has been flushed while it ran.
+        while n_read < len(expected) and time.monotonic() < deadline_s and writer.poll() is None:
+            try:
+                n_read = len(read_flight(path).states)
+            except LogError:
+                n_read = 0
+        writer.kill()
+    flight = read_flight(path, with_images=True)
+    assert flight.states == expected
+    assert flight.is_truncated
+    assert flight.mission_ended is None
+    assert any(report.jpeg for report in flight.reports)
+
+
+FILL_THE_DISK = """
+import resource
+from pathlib import Path
+import sys
+from tests.log.synthetic_flight import *
+records = list(fly(image_period_s=1.0))
+resource.setrlimit(resource.RLIMIT_FSIZE, (400_000, 400_000))
+recorder = write_log(Path(sys.argv[1]), records)
+print(recorder.failure)
+"""
+
+
+def test_a_full_disk_is_a_failure_to_look_at_and_no_exception(tmp_path: Path) -> None:
+    path = tmp_path / "full.mcap"
+    command = [sys.executable, "-W", "error", "-c", FILL_THE_DISK, str(path)]
+    done = subprocess.run(command, env=child_environment(), capture_output=True, text=True, check=True)
+    assert f"The log {path} cannot be written any more" in done.stdout
+    assert done.stderr == ""
+    flight = read_flight(path)
+    assert flight.is_truncated
+    assert 0 < len(flight.states) < 2_000
+
+
+def test_a_record_that_cannot_be_logged_is_a_failure_and_the_rest_is_kept(tmp_path: Path) -> None:
+    event = Event(START_NS, "x", Severity.INFO, "y")
+    recorder = write_log(tmp_path / "a.mcap", [(0, object()), (0, event)])
+    assert recorder.failure is not None
+    assert "object" in recorder.failure
+    assert read_flight(tmp_path / "a.mcap").events == (event,)
+
+
+def test_names_from_an_enum_are_logged_as_their_words(tmp_path: Path) -> None:
+    event = Event(START_NS, Hazard.LINE_LOST, Severity.WARNING, "No line for 2 s.", Reaction.LAND)
+    assert write_log(tmp_path / "a.mcap", [(0, event)]).failure is None
+    (read,) = read_flight(tmp_path / "a.mcap").events
+    assert (type(read.name), read.name, read.reaction) == (str, str(Hazard.LINE_LOST), str(Reaction.LAND))
+
+
+def test_a_log_that_exists_or_cannot_be_made_is_refused_before_the_flight(tmp_path: Path) -> None:
+    (tmp_path / "there.mcap").touch()
+    (tmp_path / "file").touch()
+    for path in (tmp_path / "there.mcap", tmp_path / "file" / "a.mcap"):
+        with pytest.raises(LogError, match="cannot be made"):
+            write_log(path, [])
+
+
+def test_a_slow_disk_costs_images_before_data(flown: list[tuple[int, object]]) -> None:
+    (report,) = [item for _, item in flown if isinstance(item, VisionReport) and item.jpeg][:1]
+    backlog = Backlog(max_records=10, max_images=2)
+    for _ in range(12):
+        backlog.put(report)
+    taken = backlog.take(0.0)
+    assert taken == [report, report] + [replace(report, jpeg=None)] * 8
+    assert (backlog.n_dropped_images, backlog.n_dropped_records) == (8, 2)
+    backlog.put(report)
+    backlog.close()
+    backlog.put(report)
+    assert [backlog.take(0.0), backlog.take(0.0)] == [[report], None]
+    assert backlog.n_dropped_records == 3
+
+
+def test_status_texts_and_setpoints_take_their_time_from_the_caller(tmp_path: Path) -> None:
+    with Recorder(tmp_path / "a.mcap", mission_text="", mission_name="m", metadata={}, clock=FixedClock()) as recorder:
+        recorder.record_status_text(START_NS + 7, "Armed by external command")
+        put_down(recorder, START_NS + TICK_NS, Setpoint(1.0, 2.0, -3.0, 0.5))
+    flight = read_flight(tmp_path / "a.mcap")
+    assert flight.status_texts == (StatusText(START_NS + 7, "Armed by external command"),)
+    assert flight.setpoints == (SentSetpoint(START_NS + TICK_NS, 1.0, 2.0, -3.0, 0.5),)
+    assert flight.end_ns == START_NS + TICK_NS
+
+
+def test_a_log_is_named_after_mission_and_utc_start() -> None:
+    start = datetime(2026, 3, 4, 23, 5, 6, tzinfo=timezone(timedelta(hours=-5)))
+    assert log_path(Path("logs"), "Follow line/2", start) == Path("logs/Follow-line-2-20260305T040506Z.mcap")
+    assert log_path(Path("logs"), "..", start.astimezone(UTC)).name == "mission-20260305T040506Z.mcap"
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        (b"", "is empty"),
+        (b"some text that is no log", "is not an MCAP file"),
+        (b"\x89MCAP0\r\n", "holds no mission"),
+    ],
+)
+def test_what_is_no_log_is_refused_in_a_sentence(tmp_path: Path, content: bytes, words: str) -> None:
+    (tmp_path / "a.mcap").write_bytes(content)
+    with pytest.raises(LogError, match=words):
+        read_flight(tmp_path / "a.mcap")
+
+
+def test_a_missing_log_and_a_folder_are_refused_in_a_sentence(tmp_path: Path) -> None:
+    with pytest.raises(LogError, match=r"cannot be read \(No such file"):
+        read_flight(tmp_path / "nothing.mcap")
+    with pytest.raises(LogError, match="is a folder; name one of the"):
+        read_flight(tmp_path)
+
+
+def test_a_damaged_log_is_refused(log: Path, tmp_path: Path) -> None:
+    data = bytearray(log.read_bytes())
+    data[len(data) // 2] ^= 0xFF
+    (tmp_path / "a.mcap").write_bytes(data)
+    with pytest.raises(LogError, match="is damaged"):
+        read_flight(tmp_path / "a.mcap")

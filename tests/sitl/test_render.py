@@ -1,0 +1,293 @@
+"""The renderer shows the world where it is, with the coverage it has, and the same every time."""
+
+import dataclasses
+import functools
+import math
+
+import cv2
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from drivers.camera.camera import Intrinsics
+from sitl.ground import build_texture, dither, light_ground, map_ground
+from sitl.lens import CameraMount, camera_pose, lens_vector, pinhole, ray_table
+from sitl.linework import build_layers, cast_shadow
+from sitl.map import render_map
+from sitl.pose import Pose
+from sitl.projection import project_point
+from sitl.render import Renderer, merge_layer
+from sitl.sensor import Optics, develop, fall_off, noise_table, tone_curve
+from sitl.world import Conductor, World, load_world
+
+FLAWLESS = Optics(blur_px=0.0, corner_light=1.0, read_noise=0.0, shot_noise=0.0)
+CAMERA = pinhole(320, 240, math.radians(70.0))
+BENT = dataclasses.replace(CAMERA, distortion=(-0.22, 0.06, 0.001, -0.0005, 0.0))
+
+
+@functools.cache
+def world() -> World:
+    return load_world()
+
+
+def turned(yaw_rad: float, pitch_rad: float = 0.0, roll_rad: float = 0.0) -> tuple[float, float, float, float]:
+    """The quaternion of yaw, then pitch, then roll."""
+    cy, sy = math.cos(yaw_rad / 2), math.sin(yaw_rad / 2)
+    cp, sp = math.cos(pitch_rad / 2), math.sin(pitch_rad / 2)
+    cr, sr = math.cos(roll_rad / 2), math.sin(roll_rad / 2)
+    return (
+        cr * cp * cy + sr * sp * sy,
+        sr * cp * cy - cr * sp * sy,
+        cr * sp * cy + sr * cp * sy,
+        cr * cp * sy - sr * sp * cy,
+    )
+
+
+def over_the_line(height_m: float, heading_deg: float = 110.0, pitch_rad: float = 0.0, roll_rad: float = 0.0) -> Pose:
+    return Pose(0, 11.276, 4.104, -height_m, turned(math.radians(heading_deg), pitch_rad, roll_rad))
+
+
+def linear(image: NDArray[np.uint8]) -> NDArray[np.float64]:
+    """The inverse of the sRGB transfer function."""
+    v = image.astype(np.float64) / 255.0
+    return np.where(v <= 0.04045, v / 12.92, ((v + 0.055) / 1.055) ** 2.4)
+
+
+def dim(scene: World) -> World:
+    """The same in less light, so that nothing reaches white and light can be summed."""
+    return dataclasses.replace(scene, sun=dataclasses.replace(scene.sun, level=0.4))
+
+
+def one_wire(diameter_m: float) -> World:
+    """The world with one level wire, 10 m up over the vehicle's start, and no poles."""
+    points = np.array([[0.0, -200.0, -10.0], [0.0, 200.0, -10.0]])
+    return dataclasses.replace(world(), supports=(), conductors=(Conductor(diameter_m, points),))
+
+
+NO_WIRE = dataclasses.replace(load_world(), supports=(), conductors=())
+
+
+@pytest.mark.parametrize("heading_deg", [0.0, 7.0, 31.0, 45.0, 68.0, 90.0])
+def test_a_conductor_thinner_than_a_pixel_adds_its_true_light(heading_deg: float) -> None:
+    """0.4 px of wire add a tenth of the light that 4 px add, at every angle."""
+    height_m = 16.0
+    diameter_m = 0.4 * (height_m - 10.0) / CAMERA.fx_px
+    pose = Pose(0, 0.05, 0.0, -height_m, turned(math.radians(heading_deg)))
+    none, thin, thick = (
+        linear(Renderer(dim(scene), CAMERA, optics=FLAWLESS).render(pose, 0)).sum()
+        for scene in (NO_WIRE, one_wire(diameter_m), one_wire(10.0 * diameter_m))
+    )
+    assert (thin - none) / (thick - none) == pytest.approx(0.1, rel=0.03)
+
+
+def test_the_line_is_seen_where_it_is_projected() -> None:
+    """Bright ridges run along the projected conductors, also through a bent lens and a tilted camera."""
+    for camera in (CAMERA, BENT):
+        renderer = Renderer(world(), camera, optics=FLAWLESS)
+        pose = over_the_line(15.0, 75.0, math.radians(-9.0), math.radians(7.0))
+        image = linear(renderer.render(pose, 0)).mean(axis=2).astype(np.float32)
+        for pieces in renderer.project(pose):
+            assert len(pieces) > 5
+            middles = (pieces[:, :2] + pieces[:, 2:]) / 2
+            along = pieces[:, 2:] - pieces[:, :2]
+            normal = np.stack([-along[:, 1], along[:, 0]], axis=-1) / np.linalg.norm(along, axis=1)[:, None]
+            inside = np.all((middles > 8) & (middles < [310, 230]), axis=1)
+            profile = np.stack(
+                [
+                    cv2.remap(image, *(middles + shift * normal).astype(np.float32).T, cv2.INTER_LINEAR).ravel()[inside]
+                    for shift in range(-4, 5)
+                ]
+            )
+            assert np.argmax(profile.mean(axis=1)) == 4
+
+
+def test_the_image_hangs_together_with_the_vehicle() -> None:
+    """Up in the image is ahead, right is right; the nose down looks back, the right side down looks left."""
+    renderer = Renderer(one_wire(0.05), CAMERA)
+
+    def seen_at(pose: Pose) -> NDArray[np.float64]:
+        (pieces,) = renderer.project(pose)
+        return np.array([pieces[:, [0, 2]].mean(), pieces[:, [1, 3]].mean()])
+
+    ahead = seen_at(Pose(0, -1.0, 0.0, -16.0, turned(0.0)))  # the wire is north of a vehicle that looks north
+    assert ahead == pytest.approx([159.5, 119.5 - CAMERA.fy_px / 6.0])
+    right = seen_at(Pose(0, -1.0, 0.0, -16.0, turned(-math.pi / 2)))  # and right of one that looks west
+    assert right == pytest.approx([159.5 + CAMERA.fx_px / 6.0, 119.5])
+    # Nose up by 0.1 rad turns the camera's axis forward, so what is below moves back in the image.
+    pitched = seen_at(Pose(0, 0.0, 0.0, -16.0, turned(0.0, 0.1)))
+    assert pitched[1] == pytest.approx(119.5 + CAMERA.fy_px * math.tan(0.1))
+    # Right side down turns the camera's axis to the left, so what is below moves right in the image.
+    rolled = seen_at(Pose(0, 0.0, 0.0, -16.0, turned(-math.pi / 2, 0.0, 0.1)))
+    assert rolled[0] == pytest.approx(159.5 + CAMERA.fx_px * math.tan(0.1))
+
+
+@given(
+    north_m=st.floats(-30, 30), yaw_rad=st.floats(-3, 3), pitch_rad=st.floats(-0.4, 0.4), roll_rad=st.floats(-0.4, 0.4)
+)
+@settings(deadline=None, max_examples=40)
+def test_rays_and_projection_are_inverse(north_m: float, yaw_rad: float, pitch_rad: float, roll_rad: float) -> None:
+    rays = ray_table(BENT)
+    centre, ned_from_camera = camera_pose(
+        Pose(0, north_m, 2.0, -14.0, turned(yaw_rad, pitch_rad, roll_rad)), CameraMount((0.1, 0.0, 0.05))
+    )
+    for v, u in ((0, 0), (120, 160), (239, 319), (30, 300)):
+        ray = ned_from_camera @ np.array([*rays[:, v, u].astype(float), 1.0])
+        point = centre + 7.0 * ray
+        x, y, z = ned_from_camera.T @ (point - centre)
+        assert project_point(x, y, z, lens_vector(BENT)) == pytest.approx((u, v), abs=2e-3)
+
+
+@pytest.mark.parametrize(
+    "pose",
+    [
+        Pose(0, 0.0, 0.0, -0.1, turned(0.35)),
+        Pose(0, 0.0, 0.0, 0.0, turned(0.35)),
+        over_the_line(10.0),
+        over_the_line(9.6),
+        over_the_line(15.0, 30.0, 1.2, 0.8),
+        Pose(0, 16.748, -10.930, -10.001, turned(0.3)),
+        Pose(0, 0.0, 0.0, -400.0, turned(0.0, 0.6)),
+    ],
+)
+def test_any_pose_gives_an_image_with_something_in_it(pose: Pose) -> None:
+    image = Renderer(world(), BENT).render(pose, 3)
+    assert image.shape == (240, 320, 3)
+    assert image.dtype == np.uint8
+    assert 20.0 < image.mean() < 240.0
+    assert image.std() > 3.0
+
+
+def test_the_same_pose_and_seed_give_the_same_image() -> None:
+    pose = over_the_line(16.0)
+    one, other = Renderer(world(), CAMERA, seed=5), Renderer(world(), CAMERA, seed=5)
+    first = one.render(pose, 7)
+    one.render(over_the_line(3.0), 8)
+    np.testing.assert_array_equal(first, one.render(pose, 7))
+    np.testing.assert_array_equal(first, other.render(pose, 7))
+    assert np.any(first != one.render(pose, 8))
+    assert np.any(first != Renderer(world(), CAMERA, seed=6).render(pose, 7))
+
+
+def test_less_light_makes_a_darker_image() -> None:
+    dusk = dataclasses.replace(world(), sun=dataclasses.replace(world().sun, level=0.2))
+    pose = over_the_line(16.0)
+    day, evening = (linear(Renderer(w, CAMERA, optics=FLAWLESS).render(pose, 0)).mean() for w in (world(), dusk))
+    assert evening / day == pytest.approx(0.2, abs=0.01)
+
+
+def test_the_ground_has_contrast_at_every_height() -> None:
+    for height_m in (0.5, 5.0, 12.0, 25.0):
+        image = Renderer(NO_WIRE, CAMERA, optics=FLAWLESS).render(over_the_line(height_m), 0)
+        assert cv2.cvtColor(image, cv2.COLOR_BGR2GRAY).std() > 6.0
+
+
+def test_a_shadow_takes_away_as_much_sun_as_its_wire_stops() -> None:
+    sun_ned = np.array([0.0, 0.6, -0.8])
+    wire = np.array([[3.0, 0.0, -8.0, 7.0, 0.0, -8.0, 0.014, 0.014, 1.0]])
+    (shadow,) = cast_shadow(wire, sun_ned)
+    assert shadow[:6] == pytest.approx([3.0, -6.0, 0.0, 7.0, -6.0, 0.0])
+    assert shadow[6] == pytest.approx(10.0 * math.radians(0.53))
+    assert shadow[6] * shadow[8] == pytest.approx(0.014)
+
+
+def test_every_support_has_its_members() -> None:
+    shadows, poles, arms, pins, wires = build_layers(world())
+    assert len(poles.members) == len(poles.discs) == len(arms.members) == 9
+    assert len(pins.members) == 27
+    assert len(wires.members) == 3 * 8 * 90
+    assert len(shadows.members) == 9 + 9 + 27 + len(wires.members)
+
+
+def test_a_map_shows_the_line_where_it_runs() -> None:
+    bounds_ne_m = (-20.0, -10.0, 30.0, 40.0)
+    with_line = linear(render_map(world(), bounds_ne_m, 4.0)).mean(axis=2)
+    without = linear(render_map(NO_WIRE, bounds_ne_m, 4.0)).mean(axis=2)
+    assert with_line.shape == (200, 200)
+    brighter = with_line - without
+    for conductor in world().conductors:
+        north_m, east_m, _ = conductor.points_ned_m.T
+        inside = (abs(north_m - 5) < 24) & (abs(east_m - 15) < 24)
+        columns = np.round((east_m[inside] + 10.0) * 4.0 - 0.5).astype(int)
+        rows = np.round((30.0 - north_m[inside]) * 4.0 - 0.5).astype(int)
+        assert brighter[rows, columns].mean() > 0.2
+    assert np.median(np.abs(brighter)) < 1e-3
+
+
+def test_a_map_without_an_area_is_refused() -> None:
+    with pytest.raises(ValueError, match="no picture"):
+        render_map(world(), (0.0, 0.0, 0.0, 10.0), 4.0)
+
+
+def test_a_mount_must_be_a_rotation() -> None:
+    with pytest.raises(ValueError, match="rotation"):
+        CameraMount(body_from_camera=np.ones((3, 3)))
+
+
+@pytest.mark.parametrize("arguments", [(0, 480, 1.0), (640, 480, 0.0), (640, 480, math.pi)])
+def test_an_impossible_pinhole_is_refused(arguments: tuple[int, int, float]) -> None:
+    with pytest.raises(ValueError, match="not"):
+        pinhole(*arguments)
+
+
+def test_a_texture_keeps_its_brightness_over_all_levels() -> None:
+    picture = np.random.default_rng(1).integers(0, 256, (64, 64, 4), dtype=np.uint8)
+    texture = build_texture(picture, 0.1)
+    assert [int(side) for side in texture.levels[:, 2]] == [64, 32, 16, 8, 4]
+    for row, column, side in texture.levels.astype(int):
+        level = texture.atlas[row : row + side, column : column + side]
+        assert level.mean() == pytest.approx(picture.mean(), abs=0.6)
+        np.testing.assert_array_equal(texture.atlas[row + side, column : column + side], level[0])
+    with pytest.raises(ValueError, match="square"):
+        build_texture(picture[:, :60], 0.1)
+
+
+def test_compiled_ground_kernels_equal_plain_python() -> None:
+    camera: Intrinsics = pinhole(40, 30, 1.3)
+    texture = build_texture(np.random.default_rng(2).integers(0, 256, (64, 64, 4), dtype=np.uint8), 0.4)
+    centre, ned_from_camera = camera_pose(Pose(0, 3.0, -50.0, -9.0, turned(0.7, 1.2, -0.3)), CameraMount())
+    maps = []
+    for kernel in (map_ground, map_ground.py_func):
+        columns, rows = np.empty((2, 30, 40), dtype=np.float32)
+        kernel(
+            columns, rows, ray_table(camera), dither(40, 30), centre, ned_from_camera, camera.fx_px,
+            texture.levels, texture.texel_m,
+        )  # fmt: skip
+        maps.append(np.stack([columns, rows]))
+    assert maps[0].min() == -10.0  # some of it is sky
+    np.testing.assert_allclose(maps[0], maps[1], atol=2e-3)
+
+    surface, detail = np.random.default_rng(3).integers(0, 256, (2, 30, 40, 4), dtype=np.uint8)
+    lights = np.empty((2, 30, 40, 3), dtype=np.float32)
+    light_ground(lights[0], surface, detail)
+    light_ground.py_func(lights[1], surface, detail)
+    np.testing.assert_allclose(lights[0], lights[1], rtol=1e-5)
+
+
+@pytest.mark.parametrize("is_shadow", [False, True])
+def test_compiled_merging_equals_plain_python(is_shadow: bool) -> None:
+    rng = np.random.default_rng(4)
+    light, coverage = rng.random((12, 16, 3), dtype=np.float32), 1.4 * rng.random((12, 16), dtype=np.float32)
+    coverage[rng.random((12, 16)) < 0.5] = 0.0
+    results = []
+    for kernel in (merge_layer, merge_layer.py_func):
+        mine, layer, shaded = light.copy(), coverage.copy(), 0.7 * coverage
+        kernel(mine, layer, shaded, np.array([0.2, 0.4, 0.6]), is_shadow)
+        assert not layer.any()
+        assert not shaded.any()
+        results.append(mine)
+    np.testing.assert_allclose(results[0], results[1], rtol=1e-5)
+    assert np.any(results[0] != light)
+
+
+def test_compiled_developing_equals_plain_python() -> None:
+    light = np.random.default_rng(5).random((9, 30), dtype=np.float32)
+    results = []
+    for kernel in (develop, develop.py_func):
+        image = np.empty((9, 30), dtype=np.uint8)
+        kernel(
+            light, fall_off(10, 9, 0.7), 0.9, 0.003, 0.02, noise_table(1), np.arange(9) * 11, tone_curve(), image
+        )  # fmt: skip
+        results.append(image.astype(int))
+    assert np.abs(results[0] - results[1]).max() <= 1

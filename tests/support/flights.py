@@ -1,0 +1,138 @@
+"""Flying a mission in virtual time: the executive over the in-process vehicle and geometric eyes."""
+
+import asyncio
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from mission.autopilot import Setpoint
+from mission.build import pinhole_intrinsics
+from mission.executive import Executive
+from mission.plan import MissionPlan
+from mission.plan_file import read_mission
+from mission.records import Event, MissionEnded, TaskEnded, TaskStarted
+from tests.support.geometric_eyes import GeometricEyes
+from tests.support.in_process import InProcessAutopilot
+from tests.support.virtual_time import VirtualClock, run_virtually
+
+MISSIONS = Path(__file__).parents[2] / "missions"
+START_YAW_RAD = math.radians(20.0)
+LINE_HEADING_RAD = math.radians(110.0)
+LINE_POINT_NED_M = (12.0 * math.cos(START_YAW_RAD), 12.0 * math.sin(START_YAW_RAD), -9.6)
+
+ALL_TASKS_PLAN = MissionPlan.model_validate(
+    {
+        "version": 1,
+        "name": "all_tasks",
+        "tasks": [
+            {"task": "takeoff", "altitude_m": 4.0},
+            {"task": "ascend", "altitude_m": 16.0},
+            {"task": "hold", "duration_s": 4.0},
+            {"task": "move_until"},
+            {"task": "align", "turn": "right"},
+            {"task": "follow_lines", "distance_m": 12.0},
+            {"task": "rotate", "angle_deg": 180.0},
+            {"task": "move_forward", "distance_m": 12.0},
+            {"task": "descend", "altitude_m": 13.0},
+            {"task": "return"},
+        ],
+    }
+)
+
+
+class KeptLog:
+    """A mission.executive.FlightLog that keeps everything in a list."""
+
+    def __init__(self, on_record: Callable[[object], None]) -> None:
+        self.items: list[object] = []
+        self.setpoints: list[tuple[int, Setpoint]] = []
+        self.texts: list[str] = []
+        self._on_record = on_record
+
+    def record(self, item: object) -> None:
+        self.items.append(item)
+        self._on_record(item)
+
+    def record_setpoint(self, t_ns: int, setpoint: Setpoint) -> None:
+        self.setpoints.append((t_ns, setpoint))
+
+    def record_status_text(self, t_ns: int, text: str) -> None:
+        self.texts.append(text)
+
+
+@dataclass
+class Flown:
+    """A flight that is over."""
+
+    ended: MissionEnded
+    log: KeptLog
+    autopilot: InProcessAutopilot
+    stages: list[str] = field(default_factory=list)
+
+    def of(self, kind: type[Any]) -> list[Any]:
+        """The log's records of a kind, in order."""
+        return [item for item in self.log.items if isinstance(item, kind)]
+
+    @property
+    def story(self) -> list[str]:
+        """The flight as readable lines: tasks, events, the end."""
+        lines = []
+        for item in self.log.items:
+            if isinstance(item, TaskEnded):
+                lines.append(f"{item.task} {item.result}")
+            elif isinstance(item, Event):
+                lines.append(f"! {item.name} -> {item.reaction}")
+            elif isinstance(item, MissionEnded):
+                lines.append(f"mission {item.result}")
+        return lines
+
+
+@dataclass
+class Cockpit:
+    """What a test may touch while the flight goes on."""
+
+    executive: Executive
+    autopilot: InProcessAutopilot
+    eyes: GeometricEyes
+
+
+def shipped(name: str) -> MissionPlan:
+    """The plan of a shipped mission."""
+    return read_mission(MISSIONS / f"{name}.yaml").plan
+
+
+def fly(
+    plan: MissionPlan,
+    *,
+    wind_m_s: float = 0.0,
+    seed: int = 1,
+    in_task: str | None = None,
+    after_s: float = 0.5,
+    do: Callable[[Cockpit], None] | None = None,
+) -> Flown:
+    """Fly a plan to its end. `do` is called once, `after_s` into the first task named `in_task`."""
+
+    async def flight() -> Flown:
+        clock = VirtualClock()
+        autopilot = InProcessAutopilot(clock, start_yaw_rad=START_YAW_RAD, wind_m_s=wind_m_s, seed=seed)
+        camera = pinhole_intrinsics(plan.camera)
+        eyes = GeometricEyes(autopilot, clock, camera, LINE_POINT_NED_M, LINE_HEADING_RAD)
+        loop = asyncio.get_running_loop()
+        has_done = False
+
+        def on_record(item: object) -> None:
+            nonlocal has_done
+            if isinstance(item, TaskStarted) and item.task == in_task and do is not None and not has_done:
+                has_done = True
+                loop.call_later(after_s, do, Cockpit(executive, autopilot, eyes))
+
+        log = KeptLog(on_record)
+        executive = Executive(plan, autopilot, eyes, log, clock, camera)
+        ended = await executive.run()
+        if in_task is not None:
+            assert has_done, f"the flight never came to {in_task}"
+        return Flown(ended, log, autopilot)
+
+    return run_virtually(flight())

@@ -1,0 +1,136 @@
+"""What runs inside the vision worker's process: camera in, reports out, until the flight hangs up."""
+
+import os
+import signal
+import threading
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from multiprocessing.connection import Connection
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.camera.camera import Camera, CameraError, Frame
+from drivers.clock import NS_PER_S, ScaledClock
+from vision.outbox import Outbox
+from vision.pipeline import LineFinder, VisionSettings
+from vision.records import VisionReport
+
+_READ_TIMEOUT_S = 0.1
+_OUTBOX_DEPTH = 8
+_FLUSH_TIMEOUT_S = 0.5
+_HANG_TIMEOUT_S = 2.0
+_JPEG_QUALITY = 80
+
+
+@dataclass(frozen=True, slots=True)
+class WorkerReady:
+    """The camera is open and the kernels are compiled: reports follow."""
+
+    t_ns: int
+
+
+@dataclass(frozen=True, slots=True)
+class WorkerFailed:
+    """The worker ended; `message` says why in one sentence for a person."""
+
+    message: str
+
+
+WorkerEvent = WorkerReady | WorkerFailed
+
+
+def run_worker(
+    open_camera: Callable[[], Camera],
+    settings: VisionSettings,
+    clock: ScaledClock,
+    log_rate_hz: float,
+    reports: Connection,
+    lifeline: Connection,
+) -> None:
+    """Work on the camera's newest frame, again and again, until `lifeline` is closed; then return.
+
+    Sends WorkerReady, a VisionReport for each frame, and WorkerFailed when the camera or the pipeline fails.
+    """
+    # Ctrl-C and a service manager's stop reach every process of the group; only the parent knows when to stop us.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    cv2.setNumThreads(1)
+    stop = threading.Event()
+    threading.Thread(target=_watch_lifeline, args=(lifeline, stop), name="lifeline", daemon=True).start()
+    outbox: Outbox[VisionReport | WorkerEvent] = Outbox(reports.fileno(), _OUTBOX_DEPTH)
+    try:
+        with open_camera() as camera:
+            finder = LineFinder(settings)
+            finder.warm_up()
+            outbox.put(WorkerReady(clock.now_ns()))
+            reporter = Reporter(finder, clock, log_rate_hz)
+            while not stop.is_set():
+                frame = camera.read(_READ_TIMEOUT_S)
+                if frame is not None:
+                    outbox.put(reporter.report(frame))
+    except CameraError as error:
+        outbox.put(WorkerFailed(str(error)))
+    except EOFError:
+        outbox.put(WorkerFailed("The camera's recording has ended."))
+    except Exception as error:
+        outbox.put(WorkerFailed(f"The vision worker met a fault of its own: {type(error).__name__}: {error}"))
+        raise
+    finally:
+        outbox.close(_FLUSH_TIMEOUT_S)
+
+
+class Reporter:
+    """Turns frames into reports, and decides which of them carry their image."""
+
+    def __init__(self, finder: LineFinder, clock: ScaledClock, log_rate_hz: float) -> None:
+        self._finder = finder
+        self._clock = clock
+        self._log_period_ns = round(NS_PER_S / log_rate_hz) if log_rate_hz > 0 else None
+        self._next_log_ns: int | None = None
+        self._last_seq: int | None = None
+
+    def report(self, frame: Frame) -> VisionReport:
+        """Find the power lines in a frame and say so; times are taken at the end of the work."""
+        work_start_ns = time.perf_counter_ns()
+        detection = self._finder.find(frame.image)
+        work_ns = time.perf_counter_ns() - work_start_ns
+        jpeg = encode_jpeg(frame.image) if self._is_logged(frame.t_capture_ns) else None
+        n_dropped = 0 if self._last_seq is None else frame.seq - self._last_seq - 1
+        self._last_seq = frame.seq
+        return VisionReport(
+            seq=frame.seq,
+            t_capture_ns=frame.t_capture_ns,
+            estimate=detection.estimate(frame.t_capture_ns),
+            power_lines=detection.power_lines,
+            latency_ns=self._clock.now_ns() - frame.t_capture_ns,
+            work_ns=work_ns,
+            n_dropped=n_dropped,
+            jpeg=jpeg,
+        )
+
+    def _is_logged(self, t_capture_ns: int) -> bool:
+        if self._log_period_ns is None:
+            return False
+        if self._next_log_ns is not None and t_capture_ns < self._next_log_ns:
+            return False
+        # On the grid of the first frame's time, so that the rate holds although frames do not meet the due times.
+        due_ns = t_capture_ns if self._next_log_ns is None else self._next_log_ns
+        self._next_log_ns = due_ns + self._log_period_ns * (1 + (t_capture_ns - due_ns) // self._log_period_ns)
+        return True
+
+
+def encode_jpeg(image: NDArray[np.uint8]) -> bytes:
+    """Encode a grey or BGR image, (h, w) or (h, w, 3) uint8, as a JPEG for the log."""
+    _, encoded = cv2.imencode(".jpg", image, [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])
+    return encoded.tobytes()
+
+
+def _watch_lifeline(lifeline: Connection, stop: threading.Event) -> None:
+    lifeline.poll(None)  # nobody writes: it is readable when the other end is closed
+    stop.set()
+    time.sleep(_HANG_TIMEOUT_S)
+    # The main thread hangs in the camera or the pipeline, and there is nobody left to tell.
+    os._exit(1)
