@@ -58,15 +58,17 @@ class SimCamera:
 
     def __enter__(self) -> Self:
         try:
-            renderer = Renderer(load_world(self._world), self._intrinsics, self._mount, self._optics, self._seed)
             poses = PoseBlock.attach(self._pose_block)
-        except WorldError as error:
-            raise CameraError(str(error)) from error
         except FileNotFoundError as error:
             raise CameraError(
                 f"The simulated camera finds no vehicle: there is no pose block '{self._pose_block}' in shared memory; "
                 "start the simulated vehicle first."
             ) from error
+        try:
+            renderer = Renderer(load_world(self._world), self._intrinsics, self._mount, self._optics, self._seed)
+        except WorldError as error:
+            poses.close()
+            raise CameraError(str(error)) from error
         renderer.render(Pose(0, 0.0, 0.0, -1.0, (1.0, 0.0, 0.0, 0.0)), 0)  # compiles, before time counts
         self._mailbox = Mailbox()
         self._stop.clear()

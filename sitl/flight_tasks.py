@@ -8,6 +8,7 @@ from sitl.parameters import Parameters
 from sitl.vehicle import Vector, euler_of
 
 _REFERENCE_GAIN_1_S = 2.0
+_ARRIVAL_GAIN_1_S = 0.6
 _MAX_LAG_M = 2.0  # MPC_XY_ERR_MAX: the reference waits for a vehicle that falls further behind
 _APPROACH_M_S2 = 0.45  # how hard a climb or a descent brakes before its end, as recorded from PX4 v1.16
 _DESCEND_M_S = 0.6  # a failsafe descent without sticks, as recorded from PX4 v1.16
@@ -60,11 +61,15 @@ def _speed_to(distance_m: float, limit_m_s: float, braking_m_s2: float) -> float
 
 
 def _velocity_to(north_m: float, east_m: float, limit_m_s: float, braking_m_s2: float) -> tuple[float, float]:
-    """The velocity (north, east) [m/s] towards a point that far away, slow enough to stop there."""
+    """The velocity (north, east) [m/s] towards a point that far away, slow enough to stop there.
+
+    Close by it falls in proportion to the distance: the reference lags behind what is wanted of it, and with the square
+    root alone, whose gain has no bound, it would swing around the point for ever.
+    """
     distance_m = math.hypot(north_m, east_m)
     if distance_m < 1e-3:
         return (0.0, 0.0)
-    scale = _speed_to(distance_m, limit_m_s, braking_m_s2) / distance_m
+    scale = min(_speed_to(distance_m, limit_m_s, braking_m_s2) / distance_m, _ARRIVAL_GAIN_1_S)
     return (north_m * scale, east_m * scale)
 
 
@@ -196,8 +201,7 @@ class Return(_Auto):
         if self._landing is not None:
             return self._landing.step(dt_s, estimate, height_m)
         n, e, d = estimate.position_m
-        to_home_n, to_home_e = self._home_m[0] - n, self._home_m[1] - e
-        distance_m = math.hypot(to_home_n, to_home_e)
+        distance_m = math.hypot(self._home_m[0] - n, self._home_m[1] - e)
         climb_m = self.return_height_m - (self._home_m[2] - d)
         radius_m = self._parameters.get("NAV_MC_ALT_RAD")
         self._has_climbed = self._has_climbed or climb_m < radius_m
@@ -206,6 +210,8 @@ class Return(_Auto):
             return self._landing.step(dt_s, estimate, height_m)
         limit_m_s = self._parameters.get("MPC_XY_CRUISE") if self._has_climbed else 0.0
         braking_m_s2 = 0.4 * self._parameters.get("MPC_ACC_HOR")
+        reference_n, reference_e, _ = self._reference.position_m
+        to_home_n, to_home_e = self._home_m[0] - reference_n, self._home_m[1] - reference_e
         north_m_s, east_m_s = _velocity_to(to_home_n, to_home_e, limit_m_s, braking_m_s2)
         up_m_s = _speed_to(climb_m, self._parameters.get("MPC_Z_V_AUTO_UP"), _APPROACH_M_S2)
         self._reference.step(dt_s, (north_m_s, east_m_s, -up_m_s), estimate.position_m)

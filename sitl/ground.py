@@ -8,7 +8,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-_BLOCK_PX = 16  # the mip level is worked out once for so many pixels of a row
+_BLOCK_PX = 32  # the mip level is worked out once for so many pixels of a row
 _BORDER = 2  # texels copied from the other edge, so that interpolation sees across the seam
 _SMALLEST = 4
 _HUE = 0.25  # how far the detail's hue turns grass from green to straw and back
@@ -119,8 +119,8 @@ def map_ground(
                 side = side1 if is_coarse else side0
                 x = (east_m + depth_m * (r10 * rx + r11 * ry + r12)) * scale - half
                 y = (north_m + depth_m * (r00 * rx + r01 * ry + r02)) * scale - half
-                x += (column1 if is_coarse else column0) - np.float32(math.floor(x / side)) * side
-                y += (row1 if is_coarse else row0) - np.float32(math.floor(y / side)) * side
+                x += (column1 if is_coarse else column0) - np.floor(x / side) * side
+                y += (row1 if is_coarse else row0) - np.floor(y / side) * side
                 columns[v, u] = x if fall > horizon else outside
                 rows[v, u] = y if fall > horizon else outside
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 from sitl.autopilot import SimAutopilot
 from sitl.modes import Answer, Mode
-from sitl.vehicle import euler_of
+from sitl.vehicle import Airframe, Vehicle, euler_of
 
 STEP_S = 0.004
 
@@ -85,9 +85,11 @@ def figures(
     }
 
 
-def fly_nominal(moments: Moments, seed: int, *, until_s: float) -> tuple[list[Sample], float, float]:
+def fly_nominal(
+    moments: Moments, seed: int, *, until_s: float, airframe: Airframe | None = None
+) -> tuple[list[Sample], float, float]:
     """Fly the recording's commands; returns the samples, the home's height [m, down] and the leg's target north [m]."""
-    autopilot = SimAutopilot(seed=seed)
+    autopilot = SimAutopilot(Vehicle(airframe or Airframe()), seed=seed)
     autopilot.set_parameter("MIS_TAKEOFF_ALT", 10.0)
     samples: list[Sample] = []
     target = (0.0, 0.0, 0.0, 0.0)
