@@ -95,8 +95,7 @@ class Executive:
         self._task_started_ns = 0
         self._line_seen_ns = 0
         self._modes: frozenset[FlightMode] = frozenset(FlightMode)
-        self._old_modes: frozenset[FlightMode] = frozenset(FlightMode)
-        self._modes_since_ns = 0
+        self._old_modes: list[tuple[int, frozenset[FlightMode]]] = []
         self._is_offboard = False
         self._has_armed = False
         self._way_down = Command.RETURN
@@ -262,8 +261,8 @@ class Executive:
         self._log.record_setpoint(self._clock.now_ns(), self._reference)
 
     def _command_modes(self, modes: frozenset[FlightMode]) -> None:
-        self._old_modes, self._modes = self._modes, modes
-        self._modes_since_ns = self._clock.now_ns()
+        self._old_modes.append((self._clock.now_ns(), self._modes))
+        self._modes = modes
         self._is_offboard = FlightMode.OFFBOARD in modes
 
     def _allowed_modes(self, now_ns: int, state: VehicleState) -> frozenset[FlightMode]:
@@ -271,9 +270,8 @@ class Executive:
             return frozenset(
                 FlightMode
             )  # on the ground any mode is harmless, and a landing ends in one of PX4's choice
-        if now_ns - self._modes_since_ns < MODE_GRACE_S * NS_PER_S:
-            return self._modes | self._old_modes
-        return self._modes
+        self._old_modes = [old for old in self._old_modes if now_ns - old[0] < MODE_GRACE_S * NS_PER_S]
+        return self._modes.union(*(modes for _, modes in self._old_modes))
 
     # -- tasks ---------------------------------------------------------------------------------------------------
 
@@ -378,6 +376,8 @@ class Executive:
             await self._machine.trigger_named(_ENDS[result])
             return
         self._way_down = Command.LAND if reaction is Reaction.LAND else Command.RETURN
+        if isinstance(self._task, GoDownTask) and self._task.command in (self._way_down, Command.LAND):
+            return  # it is on that way already
         self._task = GoDownTask(self._way_down, PAUSE_BEFORE_GOING_DOWN_S)
         try:
             await self._autopilot.hold()

@@ -140,7 +140,7 @@ class CameraPlan(_Section):
     width_px: int = Field(640, ge=64, le=4096)
     height_px: int = Field(480, ge=64, le=4096)
     rate_hz: float = Field(30.0, gt=0, le=120)
-    hfov_deg: float = Field(65.0, ge=10, le=150, description="Horizontal field of view of the undistorted image.")
+    hfov_deg: float = Field(80.0, ge=10, le=150, description="Horizontal field of view of the undistorted image.")
 
 
 class VisionPlan(_Section):

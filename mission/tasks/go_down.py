@@ -14,7 +14,7 @@ class GoDownTask:
     needs_vision = False
 
     def __init__(self, command: Command, pause_s: float = 0.0) -> None:
-        self._command = command
+        self.command = command
         self._pause_s = pause_s
         self._age_s = 0.0
         self._is_commanded = False
@@ -27,7 +27,7 @@ class GoDownTask:
                 return Step()
             self._is_commanded = True
             self._age_s = 0.0
-            return Step(command=self._command)
+            return Step(command=self.command)
         is_down = seen.state.landed is LandedState.ON_GROUND and not seen.state.is_armed
         if is_down and self._age_s >= _TELEMETRY_LAG_S:
             return Step(done="landed and disarmed")

@@ -76,6 +76,9 @@ class MoveUntilTask:
             return
         crossing_m = sight.line.crossing_m(reference.north_m, reference.east_m, heading_rad)
         if not self._is_overhead or crossing_m is None:
-            self._goal_m = self._moved_m if self._goal_m is None else self._goal_m
+            if self._goal_m is None:  # where the vehicle is: the setpoint runs ahead of it
+                lag_north_m, lag_east_m = seen.state.north_m - reference.north_m, seen.state.east_m - reference.east_m
+                lag_m = lag_north_m * math.cos(heading_rad) + lag_east_m * math.sin(heading_rad)
+                self._goal_m = self._moved_m + min(0.0, lag_m)
         elif math.isfinite(crossing_m):
             self._goal_m = min(self._moved_m + crossing_m, self._max_distance_m)
