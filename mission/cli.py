@@ -273,3 +273,7 @@ def _print_report(report: "FlightReport", *, as_json: bool) -> None:
 def _fail(message: str, code: int) -> NoReturn:
     sys.stderr.write(message.rstrip() + "\n")
     raise typer.Exit(code)
+
+
+if __name__ == "__main__":
+    main()

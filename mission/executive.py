@@ -15,7 +15,7 @@ from drivers.clock import NS_PER_S, Clock
 from mission import machine as m
 from mission.autopilot import Autopilot, AutopilotError, FlightMode, LandedState, Setpoint, VehicleState
 from mission.build import build_task, guidance_settings, reactions, safety_limits
-from mission.eyes import Eyes, StateHistory, sight_of
+from mission.eyes import Eyes, GroupSize, StateHistory, sight_of
 from mission.guidance import leash
 from mission.plan import MissionPlan
 from mission.records import Event, MissionEnded, Result, Severity, TaskEnded, TaskStarted
@@ -87,6 +87,7 @@ class Executive:
         self._reactions = reactions(plan.safety)
         self._machine = m.FlightMachine([task.task for task in plan.tasks], self._on_change)
         self._history = StateHistory()
+        self._group = GroupSize()
         self._is_interrupted = False
         self._may_be_over_line = False
         self._memory = FlightMemory(Setpoint(0.0, 0.0, 0.0, 0.0), 0.0)
@@ -228,7 +229,9 @@ class Executive:
         reports = self._eyes.take()
         for report in reports:
             self._log.record(report)
-        sight = sight_of(reports[-1], self._history, self._camera, self._guidance, now_ns) if reports else None
+        sight = None
+        if reports:
+            sight = sight_of(reports[-1], self._history, self._group, self._camera, self._guidance, now_ns)
         if sight is not None:
             self._sight = sight
             if sight.line is not None:

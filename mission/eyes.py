@@ -56,6 +56,24 @@ class StateHistory:
         return later
 
 
+class GroupSize:
+    """How many conductors the line has, from what was counted lately.
+
+    A tilted camera may show a part of the group only; its middle is then not the line's. The size is the largest count
+    that a tenth of the last frames, and three at least, have shown: one wrong count does not make the line larger.
+    """
+
+    def __init__(self, window: int = 200) -> None:
+        self._counts: deque[int] = deque(maxlen=window)
+
+    def is_whole(self, n_lines: int) -> bool:
+        """Take one more count, and say whether it is the whole group as far as known."""
+        self._counts.append(n_lines)
+        enough = max(3, len(self._counts) // 10)
+        sizes = [size for size in set(self._counts) if self._counts.count(size) >= enough]
+        return n_lines >= max(sizes, default=0)
+
+
 def _interpolate(earlier: VehicleState, later: VehicleState, t_ns: int) -> VehicleState:
     share = (t_ns - earlier.t_ns) / (later.t_ns - earlier.t_ns)
 
@@ -85,7 +103,12 @@ def _interpolate(earlier: VehicleState, later: VehicleState, t_ns: int) -> Vehic
 
 
 def sight_of(
-    report: VisionReport, history: StateHistory, camera: Intrinsics, guidance: GuidanceSettings, now_ns: int
+    report: VisionReport,
+    history: StateHistory,
+    group: GroupSize,
+    camera: Intrinsics,
+    guidance: GuidanceSettings,
+    now_ns: int,
 ) -> Sight | None:
     """What a report means on the map. None when it is too old to steer, or when nothing is known of that time.
 
@@ -96,7 +119,8 @@ def sight_of(
     state = history.at(report.t_capture_ns)
     if state is None:
         return None
-    line = None
+    line, is_whole = None, False
     if report.estimate is not None:
         line = locate_line(report.estimate, state, camera, guidance.height_over_line_m)
-    return Sight(report.t_capture_ns, state.yaw_rad, report.estimate, line)
+        is_whole = group.is_whole(report.estimate.n_lines)
+    return Sight(report.t_capture_ns, state.yaw_rad, report.estimate, line, is_whole)

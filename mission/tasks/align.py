@@ -62,7 +62,7 @@ class AlignTask:
             self._target_rad = self._choose(heading_rad, sight.yaw_at_capture_rad)
         else:
             self._target_rad = nearest_heading_rad(heading_rad, self._target_rad)
-        self._line = sight.line
+        self._line = sight.line if sight.is_whole else self._line
         error_rad = wrap_angle_rad(self._target_rad - sight.yaw_at_capture_rad)
         self._n_in_a_row = self._n_in_a_row + 1 if abs(error_rad) < self._guidance.epsilon_rad else 0
 

@@ -39,7 +39,7 @@ class FollowLinesTask:
         if seen.sight is not None and seen.sight.line is not None:
             heading_rad = reference.yaw_rad if self._target_rad is None else self._target_rad
             self._target_rad = nearest_heading_rad(seen.sight.line.heading_rad, heading_rad)
-            self._line = seen.sight.line
+            self._line = seen.sight.line if seen.sight.is_whole else self._line
             self._unseen_s = 0.0
         setpoint = reference
         if self._target_rad is not None:

@@ -80,5 +80,5 @@ class MoveUntilTask:
                 lag_north_m, lag_east_m = seen.state.north_m - reference.north_m, seen.state.east_m - reference.east_m
                 lag_m = lag_north_m * math.cos(heading_rad) + lag_east_m * math.sin(heading_rad)
                 self._goal_m = self._moved_m + min(0.0, lag_m)
-        elif math.isfinite(crossing_m):
+        elif sight.is_whole or self._goal_m is None:
             self._goal_m = min(self._moved_m + crossing_m, self._max_distance_m)

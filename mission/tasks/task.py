@@ -17,13 +17,15 @@ from vision.records import LineEstimate
 class Sight:
     """What one frame showed: None for `estimate` and `line` where it showed no line.
 
-    `line` is the estimate put on the map with the vehicle's pose at the time of capture.
+    `line` is the estimate put on the map with the vehicle's pose at the time of capture. Its heading always counts; its
+    place only where `is_whole`: when the frame showed all of the line's conductors, as far as known.
     """
 
     t_capture_ns: int
     yaw_at_capture_rad: float
     estimate: LineEstimate | None
     line: WorldLine | None
+    is_whole: bool
 
 
 @dataclass(frozen=True, slots=True)

@@ -13,7 +13,7 @@ from drivers.clock import Clock
 from tests.support.in_process import InProcessAutopilot
 from vision.records import LineEstimate, VisionReport, wrap_line_angle_rad
 
-_NO_SEGMENTS = np.zeros((0, 4))
+NO_SEGMENTS = np.zeros((0, 4))
 FRAME_PERIOD_NS = 40_000_000
 LATENCY_NS = 60_000_000
 _REACHES_M = np.linspace(-60.0, 60.0, 241)
@@ -93,7 +93,7 @@ class GeometricEyes:
                 estimate = see_line(
                     vehicle.position_m, vehicle.quaternion, self._camera, self._point, self._heading_rad, now_ns
                 )
-            self._pending.append(VisionReport(self._seq, now_ns, estimate, _NO_SEGMENTS, LATENCY_NS, 0, 0, None))
+            self._pending.append(VisionReport(self._seq, now_ns, estimate, NO_SEGMENTS, LATENCY_NS, 0, 0, None))
             self._seq += 1
         due = [report for report in self._pending if now_ns - report.t_capture_ns >= LATENCY_NS]
         self._pending = [report for report in self._pending if now_ns - report.t_capture_ns < LATENCY_NS]
