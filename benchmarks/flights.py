@@ -23,13 +23,22 @@ HEADER = """\
 
 `make bench` regenerates this page. Every row is a whole dry-run of `missions/follow_line.yaml` in the world
 `medium_voltage`, flown by MAVSDK over UDP with vision in the loop, at {speed:g} times real time. Wind is the mean at
-20 ft; Dryden gusts come with it. Straightness is [Ceron] equations 6.3 to 6.5 (the thesis flew 0.04 to 0.22 m); the
-distance from the line and the heading error are against the simulated truth; the landing is against the take-off point.
+20 ft; Dryden gusts come with it. Straightness is [Ceron] equations 6.3 to 6.5 (the thesis flew 0.04 to 0.22 m). The
+distance from the line and the heading error are against the simulated truth, the landing against the take-off point.
 """
 COLUMNS = (
-    "wind [m/s]", "seed", "result", "straightness, leg 1 / 2 [m]", "distance from the line, mean / p95 [m]",
-    "heading error, median [deg]", "setpoints [Hz]", "longest gap [ms]", "latency p50 / p95 [ms]", "landing [m]", "speed",
-)  # fmt: skip
+    "wind [m/s]",
+    "seed",
+    "result",
+    "straightness, leg 1 / 2 [m]",
+    "distance from the line, mean / p95 [m]",
+    "heading error, median [deg]",
+    "setpoints [Hz]",
+    "longest gap [ms]",
+    "latency p50 / p95 [ms]",
+    "landing [m]",
+    "speed",
+)
 
 
 def fly(seed: int, wind_m_s: float, speed: float, log: Path) -> dict[str, Any]:

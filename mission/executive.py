@@ -7,26 +7,23 @@ task for the next step, and sends it. It never waits for vision. [Ceron] section
 import asyncio
 import contextlib
 import math
-from dataclasses import dataclass
-from typing import Protocol
 
 from drivers.camera.camera import Intrinsics
 from drivers.clock import NS_PER_S, Clock
 from mission import machine as m
-from mission.autopilot import Autopilot, AutopilotError, FlightMode, LandedState, Setpoint, VehicleState
+from mission.autopilot import Autopilot, AutopilotError, FlightMode, Setpoint, VehicleState
 from mission.build import build_task, guidance_settings, reactions, safety_limits
 from mission.eyes import Eyes, GroupSize, StateHistory, sight_of
 from mission.guidance import leash
+from mission.mode_watch import ModeWatch
 from mission.plan import MissionPlan
 from mission.records import Event, MissionEnded, Result, Severity, TaskEnded, TaskStarted
+from mission.reporting import FlightLog, Progress
 from mission.safety import Hazard, Reaction, SafetyInput, clear_of_the_line, decide, find_hazards
 from mission.tasks.go_down import GoDownTask
 from mission.tasks.task import Command, FlightMemory, Observation, Sight, Step, Task
 
 CONTROL_RATE_HZ = 20.0
-MODE_GRACE_S = 2.5
-"""How long after a command the old flight mode still explains itself: PX4's heartbeat tells its mode once a second."""
-
 PAUSE_BEFORE_GOING_DOWN_S = 2.0
 GOING_DOWN_LIMIT_S = 300.0
 
@@ -41,33 +38,6 @@ _MATTERS_GOING_DOWN = (
     Hazard.TASK_TIMED_OUT,
 )
 _ENDS = {Result.FAILED: "fail", Result.TIMED_OUT: "fail", Result.INTERRUPTED: "interrupt", Result.TAKEN_OVER: "give_up"}
-
-
-class FlightLog(Protocol):
-    """Where the records of the flight go. Never blocks and never raises."""
-
-    def record(self, item: object) -> None:
-        """Keep a record."""
-        ...
-
-    def record_setpoint(self, t_ns: int, setpoint: Setpoint) -> None:
-        """Keep a setpoint that was sent."""
-        ...
-
-    def record_status_text(self, t_ns: int, text: str) -> None:
-        """Keep the autopilot's own words."""
-        ...
-
-
-@dataclass(frozen=True, slots=True)
-class Progress:
-    """What a person who watches wants to know now."""
-
-    stage: str
-    task_index: int | None
-    state: VehicleState | None
-    sight: Sight | None
-    waiting_for: tuple[str, ...] = ()
 
 
 class Executive:
@@ -95,9 +65,7 @@ class Executive:
         self._task: Task | None = None
         self._task_started_ns = 0
         self._line_seen_ns = 0
-        self._modes: frozenset[FlightMode] = frozenset(FlightMode)
-        self._old_modes: list[tuple[int, frozenset[FlightMode]]] = []
-        self._is_offboard = False
+        self._modes = ModeWatch()
         self._has_armed = False
         self._way_down = Command.RETURN
         self._n_refusals = 0
@@ -240,41 +208,29 @@ class Executive:
 
     async def _do(self, step: Step, state: VehicleState) -> None:
         """Send what the task wants."""
+        now_ns = self._clock.now_ns()
         if step.command is Command.TAKEOFF:
             self._has_armed = True  # even when the answer gets lost: then it must come down again
             await self._autopilot.arm()
             await self._autopilot.takeoff(step.altitude_m)
-            self._command_modes(frozenset({FlightMode.TAKEOFF, FlightMode.HOLD}))
+            self._modes.command(now_ns, FlightMode.TAKEOFF, FlightMode.HOLD)
         elif step.command is Command.RETURN:
             await self._autopilot.return_home()
-            self._command_modes(frozenset({FlightMode.RETURN, FlightMode.LAND}))  # its end may be shown as LAND
+            self._modes.command(now_ns, FlightMode.RETURN, FlightMode.LAND)  # its end may be shown as LAND
         elif step.command is Command.LAND:
             await self._autopilot.land()
-            self._command_modes(frozenset({FlightMode.LAND}))
+            self._modes.command(now_ns, FlightMode.LAND)
         if step.setpoint is None:
             return
-        if self._is_offboard:
+        if self._modes.is_offboard:
             self._reference = leash(step.setpoint, state, self._guidance.leash_m)
             await self._autopilot.set_setpoint(self._reference)
         else:
             # The first setpoint is where the vehicle is: entering offboard must not move it.
             self._reference = Setpoint(state.north_m, state.east_m, state.down_m, self._reference.yaw_rad)
             await self._autopilot.start_offboard(self._reference)
-            self._command_modes(frozenset({FlightMode.OFFBOARD}))
+            self._modes.command(now_ns, FlightMode.OFFBOARD)
         self._log.record_setpoint(self._clock.now_ns(), self._reference)
-
-    def _command_modes(self, modes: frozenset[FlightMode]) -> None:
-        self._old_modes.append((self._clock.now_ns(), self._modes))
-        self._modes = modes
-        self._is_offboard = FlightMode.OFFBOARD in modes
-
-    def _allowed_modes(self, now_ns: int, state: VehicleState) -> frozenset[FlightMode]:
-        if not state.is_armed or state.landed is LandedState.ON_GROUND:
-            return frozenset(
-                FlightMode
-            )  # on the ground any mode is harmless, and a landing ends in one of PX4's choice
-        self._old_modes = [old for old in self._old_modes if now_ns - old[0] < MODE_GRACE_S * NS_PER_S]
-        return self._modes.union(*(modes for _, modes in self._old_modes))
 
     # -- tasks ---------------------------------------------------------------------------------------------------
 
@@ -340,7 +296,7 @@ class Executive:
         return SafetyInput(
             now_ns=now_ns,
             state=state,
-            allowed_modes=self._allowed_modes(now_ns, state),
+            allowed_modes=self._modes.explained(now_ns, state),
             distance_m=math.hypot(state.north_m - start.north_m, state.east_m - start.east_m),
             altitude_m=start.down_m - state.down_m,
             is_going_down=isinstance(task, GoDownTask),
@@ -384,7 +340,7 @@ class Executive:
         self._task = GoDownTask(self._way_down, PAUSE_BEFORE_GOING_DOWN_S)
         try:
             await self._autopilot.hold()
-            self._command_modes(frozenset({FlightMode.HOLD}))
+            self._modes.command(self._clock.now_ns(), FlightMode.HOLD)
         except AutopilotError as error:  # then the way down is all the more urgent, and goes on
             self._log.record(Event(self._clock.now_ns(), Hazard.COMMAND_REFUSED, Severity.WARNING, str(error)))
 

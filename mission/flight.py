@@ -13,11 +13,12 @@ from drivers.clock import ScaledClock
 from mission.autopilot import VehicleState
 from mission.autopilot_mavsdk import MavsdkAutopilot
 from mission.build import pinhole_intrinsics, vision_settings
-from mission.executive import Executive, Progress
+from mission.executive import Executive
 from mission.log.disk import log_path
 from mission.log.recorder import Recorder
 from mission.plan_file import MissionFile
 from mission.records import MissionEnded, TrueLine, TruePose
+from mission.reporting import Progress
 from mission.worker_eyes import WorkerEyes
 from vision.worker import VisionWorker
 

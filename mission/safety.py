@@ -74,8 +74,8 @@ class SafetyInput:
 
     `allowed_modes` are the flight modes that our own last command explains, and `is_going_down` says that it was to
     land or to return. `needs_line` is true for tasks that steer by the line, and `line_seen_ns` is the capture time of
-    the newest estimate, or the task's start before the first. `task_failure`, `refusal` (of a command, by the autopilot) and `internal_error` are sentences,
-    None where all is well.
+    the newest estimate, or the task's start before the first. `task_failure`, `refusal` (of a command, by the
+    autopilot) and `internal_error` are sentences, None where all is well.
     """
 
     now_ns: int

@@ -8,8 +8,8 @@ from rich.console import Console
 from rich.live import Live
 from rich.text import Text
 
-from mission.executive import Progress
 from mission.plan import MissionPlan
+from mission.reporting import Progress
 
 
 class Watch:

@@ -43,7 +43,7 @@ ALL_TASKS_PLAN = MissionPlan.model_validate(
 
 
 class KeptLog:
-    """A mission.executive.FlightLog that keeps everything in a list."""
+    """A mission.reporting.FlightLog that keeps everything in a list."""
 
     def __init__(self, on_record: Callable[[object], None]) -> None:
         self.items: list[object] = []
