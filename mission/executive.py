@@ -358,4 +358,4 @@ class Executive:
             self._log.record_status_text(self._clock.now_ns(), text)
 
     def _on_change(self, state: str) -> None:
-        self.progress = Progress(state, None, self.progress.state, self.progress.sight)
+        self.progress = Progress(state, self._machine.task_index, self.progress.state, self.progress.sight)

@@ -6,7 +6,7 @@ from types import TracebackType
 from typing import Self
 
 from drivers.camera.camera import Camera, CameraError, CameraSettings
-from drivers.camera.spec import open_camera
+from drivers.camera.spec import open_camera, parse_spec
 from drivers.clock import ScaledClock
 from mission.autopilot import VehicleState
 from mission.plan import CameraPlan
@@ -29,6 +29,7 @@ class LiveCamera:
         if source.startswith(SIM_PREFIX):
             self._hang_on_telemetry(source.removeprefix(SIM_PREFIX), plan)
         else:
+            parse_spec(source)  # a misspelt one is told now, not by the worker in the middle of getting ready
             settings = CameraSettings(plan.width_px, plan.height_px, plan.rate_hz)
             self.open_camera = functools.partial(open_camera, source, settings, self.clock)
 

@@ -44,8 +44,9 @@ class LineEstimate:
 class Detection:
     """All that the pipeline found in one image; `angle_rad` and `offset_px` as in LineEstimate.
 
-    `angle_rad` is None where the image holds no segment at all. `is_present` says whether the histogram of oriented
-    segments passed the presence threshold ([Ceron] 6.1.3): only then do `power_lines` steer a vehicle.
+    Segments run with the brighter side of their edge on their right. `angle_rad` is None where the image holds no
+    segment at all. `is_present` says whether at least one thin conductor crosses enough of the frame (docs/decisions,
+    after [Ceron] 6.1.3): only then do `power_lines` steer a vehicle.
     """
 
     segments: Segments

@@ -22,24 +22,7 @@ START_YAW_RAD = math.radians(20.0)
 LINE_HEADING_RAD = math.radians(110.0)
 LINE_POINT_NED_M = (12.0 * math.cos(START_YAW_RAD), 12.0 * math.sin(START_YAW_RAD), -9.6)
 
-ALL_TASKS_PLAN = MissionPlan.model_validate(
-    {
-        "version": 1,
-        "name": "all_tasks",
-        "tasks": [
-            {"task": "takeoff", "altitude_m": 4.0},
-            {"task": "ascend", "altitude_m": 16.0},
-            {"task": "hold", "duration_s": 4.0},
-            {"task": "move_until"},
-            {"task": "align", "turn": "right"},
-            {"task": "follow_lines", "distance_m": 12.0},
-            {"task": "rotate", "angle_deg": 180.0},
-            {"task": "move_forward", "distance_m": 12.0},
-            {"task": "descend", "altitude_m": 13.0},
-            {"task": "return"},
-        ],
-    }
-)
+ALL_TASKS_PLAN = read_mission(Path(__file__).parents[1] / "data" / "all_tasks.yaml").plan
 
 
 class KeptLog:
