@@ -42,7 +42,7 @@ class Setpoint:
 
 @dataclass(frozen=True, slots=True)
 class VehicleState:
-    """The vehicle as telemetry tells it; `t_ns` is flight time when the newest position arrived.
+    """The vehicle as telemetry tells it; `t_ns` is flight time when the older of position and attitude arrived.
 
     Position NED [m], velocity NED [m/s], attitude [rad] (FRD body to NED), battery 0 to 1 (None: not known yet).
     """
@@ -66,6 +66,10 @@ class VehicleState:
 
 class AutopilotError(Exception):
     """The autopilot refused or did not answer; the message is one sentence for a person."""
+
+
+class NoAnswerError(AutopilotError):
+    """The autopilot did not answer: nobody knows whether it obeyed."""
 
 
 class Autopilot(Protocol):
@@ -101,7 +105,7 @@ class Autopilot(Protocol):
         ...
 
     async def start_offboard(self, setpoint: Setpoint) -> None:
-        """Send `setpoint` and switch to offboard; returns once the mode was read back."""
+        """Send `setpoint` and ask for offboard; `state.mode` tells whether the autopilot went there."""
         ...
 
     async def set_setpoint(self, setpoint: Setpoint) -> None:

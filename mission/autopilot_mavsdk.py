@@ -1,8 +1,8 @@
 """The autopilot over MAVLink, by MAVSDK's native binding. The only file that imports mavsdk.
 
 What the binding does that its documentation does not say: setpoints are repeated by a C++ thread whatever our event
-loop does; `offboard.start()` may return although the autopilot refused, so the mode is read back from the heartbeat;
-and subscriptions must be cancelled before `destroy()`, or they hang for ever.
+loop does; `offboard.start()` may return although the autopilot refused, so only the heartbeat's mode counts; and
+subscriptions must be cancelled before `destroy()`, or they hang for ever.
 """
 
 import asyncio
@@ -19,7 +19,7 @@ from mavsdk.plugins.telemetry import FlightMode as MavsdkMode
 from mavsdk.plugins.telemetry import LandedState as MavsdkLanded
 
 from drivers.clock import Clock
-from mission.autopilot import AutopilotError, FlightMode, LandedState, Setpoint, VehicleState
+from mission.autopilot import AutopilotError, FlightMode, LandedState, NoAnswerError, Setpoint, VehicleState
 
 T = TypeVar("T")
 
@@ -72,6 +72,7 @@ class MavsdkAutopilot:
         self._subscriptions: list[asyncio.Task[None]] = []
         self._newest: dict[str, Any] = {"connected": True, "battery": None}
         self._position_ns = 0
+        self._attitude_ns = 0
         self._status_texts: list[str] = []
 
     @property
@@ -83,7 +84,7 @@ class MavsdkAutopilot:
         position, velocity = newest["position"].position, newest["position"].velocity
         attitude = newest["attitude"]
         return VehicleState(
-            t_ns=self._position_ns,
+            t_ns=min(self._position_ns, self._attitude_ns),
             north_m=position.north_m,
             east_m=position.east_m,
             down_m=position.down_m,
@@ -115,9 +116,12 @@ class MavsdkAutopilot:
     async def connect(self) -> None:
         """Find the autopilot and start its streams."""
         log_subscribe(self._take_log)
+        # As a ground station, because that is how PX4's answers were recorded (tests/sitl/golden).
         self._mavsdk = Mavsdk(Configuration.create_with_component_type(ComponentType.GROUND_STATION))
         try:
-            await self._mavsdk.add_any_connection(self._connection)
+            await asyncio.wait_for(self._mavsdk.add_any_connection(self._connection), COMMAND_TIMEOUT_S)
+        except TimeoutError:
+            raise AutopilotError(f"the connection {self._connection} does not open") from None
         except MavsdkConnectionError as error:
             raise AutopilotError(
                 f"cannot open the connection {self._connection}: {error}; try udpin://0.0.0.0:14540"
@@ -130,7 +134,7 @@ class MavsdkAutopilot:
         telemetry = TelemetryAsync(system)
         streams: list[tuple[AsyncIterator[Any], Callable[[Any], None]]] = [
             (telemetry.subscribe_position_velocity_ned(), self._take_position),
-            (telemetry.subscribe_attitude_euler(), self._keep("attitude")),
+            (telemetry.subscribe_attitude_euler(), self._take_attitude),
             (telemetry.subscribe_flight_mode(), self._keep("mode")),
             (telemetry.subscribe_landed_state(), self._keep("landed")),
             (telemetry.subscribe_armed(), self._keep("armed")),
@@ -190,10 +194,12 @@ class MavsdkAutopilot:
         try:
             return await asyncio.wait_for(call, timeout_s)
         except TimeoutError:
-            raise AutopilotError(f"the autopilot did not answer within {timeout_s:g} s when asked to {what}") from None
+            raise NoAnswerError(f"the autopilot did not answer within {timeout_s:g} s when asked to {what}") from None
         except MavsdkError as error:
             result = getattr(error, "result", None)
             words = str(getattr(result, "name", error)).replace("_", " ").lower()
+            if words == "timeout":
+                raise NoAnswerError(f"the autopilot did not answer when asked to {what}") from None
             raise AutopilotError(f"the autopilot refused to {what}: {words}") from None
 
     async def _pump(self, stream: AsyncIterator[Any], take: Callable[[Any], None]) -> None:
@@ -209,6 +215,10 @@ class MavsdkAutopilot:
     def _take_position(self, item: Any) -> None:
         self._newest["position"] = item
         self._position_ns = self._clock.now_ns()
+
+    def _take_attitude(self, item: Any) -> None:
+        self._newest["attitude"] = item
+        self._attitude_ns = self._clock.now_ns()
 
     def _take_battery(self, item: Any) -> None:
         percent = float(item.remaining_percent)

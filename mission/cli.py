@@ -1,16 +1,21 @@
 """The command line: the composition root. Heavy rooms are imported by the command that needs them.
 
 Exit codes: 0 done · 1 something could not be read or written · 2 bad input, nothing was connected · 3 not ready, the
-vehicle was never armed · 4 the mission ended early · 5 the pilot has the vehicle · 130 stopped by the operator.
+vehicle was never armed · 4 the mission ended early · 5 the pilot, or the autopilot's failsafe,
+has the vehicle · 70 a fault of lineflight's own · 130 stopped by the operator.
 """
 
 import asyncio
 import json
 import sys
+import tempfile
+import traceback
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, NoReturn
 
 import typer
+
+from mission.log.errors import LogError
 
 if TYPE_CHECKING:
     from mission.flight import FlightOutcome, FlightSetup
@@ -23,6 +28,7 @@ EXIT_BAD_INPUT = 2
 EXIT_NOT_READY = 3
 EXIT_ENDED_EARLY = 4
 EXIT_TAKEN_OVER = 5
+EXIT_FAULT = 70
 EXIT_INTERRUPTED = 130
 
 app = typer.Typer(
@@ -43,8 +49,17 @@ JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON instead of 
 
 
 def main() -> None:
-    """Run the command line."""
-    app()
+    """Run the command line. A fault of our own ends in a sentence too, and its traceback in a file."""
+    try:
+        app()
+    except Exception as error:
+        trace = Path(tempfile.gettempdir()) / "lineflight-fault.txt"
+        trace.write_text(traceback.format_exc(), encoding="utf-8")
+        sys.stderr.write(
+            f"lineflight met a fault of its own ({type(error).__name__}: {error}); "
+            f"a vehicle under its setpoints was told to hold. Please send {trace} to the developers.\n"
+        )
+        sys.exit(EXIT_FAULT)
 
 
 @app.command("dry-run")
@@ -127,7 +142,7 @@ def run(
 def sitl(
     world: WorldOption = None,
     speed: SpeedOption = 1.0,
-    port: Annotated[int, typer.Option(min=1, max=65535, help="UDP port that the vehicle sends to.")] = 14540,
+    port: Annotated[int, typer.Option(min=1, max=65535 - 40, help="UDP port that the vehicle sends to.")] = 14540,
     seed: SeedOption = 1,
     wind: WindOption = 0.0,
 ) -> None:
@@ -176,7 +191,11 @@ def detect(
 @app.command()
 def inspect(log: Annotated[Path, typer.Argument(help="A flight log (.mcap).")], as_json: JsonOption = False) -> None:
     """Say what happened in a flight."""
-    _print_report(_summarise(log), as_json=as_json)
+    try:
+        report = _read_report(log)
+    except LogError as error:
+        _fail(str(error), EXIT_BAD_INPUT)
+    _print_report(report, as_json=as_json)
 
 
 def _read_mission(path: Path) -> "MissionFile":
@@ -192,7 +211,6 @@ def _fly(setup: "FlightSetup") -> "FlightOutcome":
     from rich.console import Console
 
     from mission.flight import fly
-    from mission.log.records import LogError
     from mission.watch import Watch
 
     try:
@@ -203,13 +221,22 @@ def _fly(setup: "FlightSetup") -> "FlightOutcome":
 
 
 def _finish(outcome: "FlightOutcome", *, as_json: bool, simulation: "Simulation | None") -> NoReturn:
-    """Print the report, draw the picture, and exit with the code that tells how it ended."""
-    from mission.log.summary import to_json
+    """Print the report, draw the picture, and exit with the code that tells how the flight ended.
 
-    report = _summarise(outcome.log)
-    picture = _draw(outcome.log, simulation)
+    What cannot be read or drawn afterwards is said, and changes nothing about how the flight ended.
+    """
+    if outcome.log_failure is not None:
+        sys.stderr.write(outcome.log_failure + "\n")
     speed = None if simulation is None or simulation.summary is None else simulation.summary.achieved_speed
+    try:
+        report = _read_report(outcome.log)
+    except LogError as error:
+        sys.stderr.write(f"{error}\nThe mission {outcome.ended.result}: {outcome.ended.reason}.\n")
+        raise typer.Exit(_exit_code(outcome)) from None
+    picture = _draw(outcome.log, simulation)
     if as_json:
+        from mission.log.summary import to_json
+
         extra = {"log": str(outcome.log), "picture": None if picture is None else str(picture), "achieved_speed": speed}
         typer.echo(json.dumps(to_json(report) | extra))
     else:
@@ -219,8 +246,6 @@ def _finish(outcome: "FlightOutcome", *, as_json: bool, simulation: "Simulation 
             typer.echo(f"picture  {picture}")
         if speed is not None:
             typer.echo(f"speed    {speed:.2f} times real time")
-    if outcome.log_failure is not None:
-        typer.echo(outcome.log_failure, err=True)
     raise typer.Exit(_exit_code(outcome))
 
 
@@ -228,7 +253,7 @@ def _exit_code(outcome: "FlightOutcome") -> int:
     from mission.records import Result
 
     result = outcome.ended.result
-    if result is Result.FAILED and not outcome.has_armed:
+    if result is Result.FAILED and not outcome.may_have_armed:
         return EXIT_NOT_READY
     return {Result.COMPLETED: 0, Result.INTERRUPTED: EXIT_INTERRUPTED, Result.TAKEN_OVER: EXIT_TAKEN_OVER}.get(
         result, EXIT_ENDED_EARLY
@@ -236,25 +261,21 @@ def _exit_code(outcome: "FlightOutcome") -> int:
 
 
 def _draw(log: Path, simulation: "Simulation | None") -> Path | None:
-    """The flight's picture, beside the log; None, with a word, when it cannot be written."""
-    from mission.flight_picture import write_picture
+    """The flight's picture, beside the log; None, with a word, when there can be none."""
+    from mission.flight_picture import PictureError, write_picture
 
     try:
         return write_picture(log, None if simulation is None else simulation.world)
-    except OSError as error:
-        sys.stderr.write(f"The picture beside {log} cannot be written: {error.strerror}.\n")
+    except PictureError as error:
+        sys.stderr.write(f"{error}\n")
         return None
 
 
-def _summarise(log: Path) -> "FlightReport":
+def _read_report(log: Path) -> "FlightReport":
     from mission.log.reader import read_flight
-    from mission.log.records import LogError
     from mission.log.summary import summarise
 
-    try:
-        return summarise(read_flight(log))
-    except LogError as error:
-        _fail(str(error), EXIT_BAD_INPUT)
+    return summarise(read_flight(log))
 
 
 def _print_report(report: "FlightReport", *, as_json: bool) -> None:

@@ -7,19 +7,21 @@ task for the next step, and sends it. It never waits for vision. [Ceron] section
 import asyncio
 import contextlib
 import math
+from collections.abc import Awaitable
 
 from drivers.camera.camera import Intrinsics
 from drivers.clock import NS_PER_S, Clock
 from mission import machine as m
-from mission.autopilot import Autopilot, AutopilotError, FlightMode, Setpoint, VehicleState
+from mission.autopilot import Autopilot, AutopilotError, FlightMode, NoAnswerError, Setpoint, VehicleState
 from mission.build import build_task, guidance_settings, reactions, safety_limits
 from mission.eyes import Eyes, GroupSize, StateHistory, sight_of
 from mission.guidance import leash
 from mission.mode_watch import ModeWatch
 from mission.plan import MissionPlan
+from mission.preflight import not_at_rest, wait_until_ready
 from mission.records import Event, MissionEnded, Result, Severity, TaskEnded, TaskStarted
 from mission.reporting import FlightLog, Progress
-from mission.safety import Hazard, Reaction, SafetyInput, clear_of_the_line, decide, find_hazards
+from mission.safety import Hazard, Reaction, SafetyInput, decide, find_hazards, keep_going_down, way_down
 from mission.tasks.go_down import GoDownTask
 from mission.tasks.task import Command, FlightMemory, Observation, Sight, Step, Task
 
@@ -27,17 +29,15 @@ CONTROL_RATE_HZ = 20.0
 PAUSE_BEFORE_GOING_DOWN_S = 2.0
 GOING_DOWN_LIMIT_S = 300.0
 
-_READY_POLL_S = 0.2
-_MAX_REFUSALS = 3
-_MATTERS_GOING_DOWN = (
-    Hazard.TAKEOVER,
-    Hazard.LINK_LOST,
-    Hazard.TELEMETRY_STALE,
-    Hazard.COMMAND_REFUSED,
-    Hazard.INTERNAL_ERROR,
-    Hazard.TASK_TIMED_OUT,
-)
-_ENDS = {Result.FAILED: "fail", Result.TIMED_OUT: "fail", Result.INTERRUPTED: "interrupt", Result.TAKEN_OVER: "give_up"}
+_STAYS_CLEAR = ("takeoff", "ascend", "descend", "rotate", "hold", "land", "return")
+"""Tasks that do not carry the vehicle anywhere over ground by themselves; the others may bring it over the line."""
+
+_TRIGGERS = {Result.FAILED: "fail", Result.TIMED_OUT: "fail", Result.INTERRUPTED: "interrupt"}
+_RESULTS = {
+    Hazard.INTERRUPTED: Result.INTERRUPTED,
+    Hazard.TASK_TIMED_OUT: Result.TIMED_OUT,
+    Hazard.TAKEOVER: Result.TAKEN_OVER,
+}
 
 
 class Executive:
@@ -58,34 +58,27 @@ class Executive:
         self._machine = m.FlightMachine([task.task for task in plan.tasks], self._on_change)
         self._history = StateHistory()
         self._group = GroupSize()
-        self._is_interrupted = False
-        self._may_be_over_line = False
+        self._modes = ModeWatch()
         self._memory = FlightMemory(Setpoint(0.0, 0.0, 0.0, 0.0), 0.0)
         self._reference = self._memory.start
         self._task: Task | None = None
         self._task_started_ns = 0
         self._line_seen_ns = 0
-        self._modes = ModeWatch()
-        self._has_armed = False
-        self._way_down = Command.RETURN
-        self._n_refusals = 0
-        self._sight: Sight | None = None
-        self._noted: set[Hazard] = set()
+        self._may_be_over_line = False
+        self._is_interrupted = False
+        self._was_told_to_arm = False
+        self._was_armed = False
         self._task_failure: str | None = None
         self._refusal: str | None = None
         self._internal_error: str | None = None
+        self._noted: set[Hazard] = set()
         self._end: tuple[Result, str] = (Result.FAILED, "")
         self.progress = Progress(m.PREFLIGHT, None, None, None)
 
     @property
-    def has_armed(self) -> bool:
-        """Whether the vehicle was ever told to arm."""
-        return self._has_armed
-
-    @property
-    def states(self) -> list[str]:
-        """The names of the mission's task states, in order."""
-        return self._machine.task_states
+    def may_have_armed(self) -> bool:
+        """Whether the vehicle was armed, or told to without a refusal."""
+        return self._was_told_to_arm or self._was_armed
 
     def request_stop(self) -> None:
         """Ask the flight to end now: before arming at once, in the air by the mission's reaction."""
@@ -94,33 +87,41 @@ class Executive:
     async def run(self) -> MissionEnded:
         """Fly the mission to its end, and say how it ended.
 
-        Raises only what is a bug in this loop itself, after the vehicle was told to hold.
+        Raises only what is a bug in this loop itself, after a vehicle under our setpoints was told to hold.
         """
         ended = await self._preflight()
         if ended is None:
             try:
                 await self._fly()
             except BaseException:
-                # Cancelled, or a bug in this very loop: leave the vehicle in a mode that it can hold by itself.
-                with contextlib.suppress(AutopilotError):
-                    await self._autopilot.hold()
+                # Cancelled, or a bug: no stream of setpoints may outlive us. In its own modes it holds by itself.
+                if self._modes.is_offboard:
+                    with contextlib.suppress(AutopilotError):
+                        await self._autopilot.hold()
                 raise
             ended = MissionEnded(self._clock.now_ns(), *self._end)
         self._log.record(ended)
         return ended
 
-    # -- before arming -------------------------------------------------------------------------------------------
-
     async def _preflight(self) -> MissionEnded | None:
-        """Connect and wait until the vehicle can arm and vision sees; the end of the mission if that never comes."""
-        try:
-            missing = await self._wait_until_ready()
-        except AutopilotError as error:
-            missing = [str(error)]
+        """Wait until all is ready; the end of the mission if that never comes."""
+
+        def tell(missing: tuple[str, ...]) -> None:
+            self._keep_status_texts()
+            self.progress = Progress(m.PREFLIGHT, None, None, None, waiting_for=missing)
+
+        missing = await wait_until_ready(
+            self._autopilot,
+            self._eyes,
+            self._clock,
+            self._plan.vehicle.ready_time_limit_s,
+            lambda: self._is_interrupted,
+            tell,
+        )
+        state = self._autopilot.state
         if self._is_interrupted:
             await self._machine.trigger_named("interrupt")
             return MissionEnded(self._clock.now_ns(), Result.INTERRUPTED, "stopped before arming")
-        state = self._autopilot.state
         if missing or state is None:
             await self._machine.trigger_named("fail")
             return MissionEnded(self._clock.now_ns(), Result.FAILED, "not ready to fly: " + "; ".join(missing))
@@ -130,28 +131,7 @@ class Executive:
         self._reference = start
         return None
 
-    async def _wait_until_ready(self) -> list[str]:
-        """What is still missing when the time limit is over; empty when all is ready."""
-        await self._autopilot.connect()
-        # Compiling and connecting take wall time, however fast the flight's clock runs.
-        loop = asyncio.get_running_loop()
-        limit_s = loop.time() + self._plan.vehicle.ready_time_limit_s
-        while True:
-            missing = list(self._autopilot.missing_health())
-            if self._autopilot.state is None:
-                missing.append("telemetry")
-            if self._eyes.failure is not None:
-                return [self._eyes.failure]
-            if not self._eyes.is_ready:
-                missing.append("vision: waiting for the first frame")
-            self._keep_status_texts()
-            self._eyes.take()
-            self.progress = Progress(m.PREFLIGHT, None, self._autopilot.state, None, tuple(missing))
-            if not missing or self._is_interrupted or loop.time() > limit_s:
-                return missing
-            await asyncio.sleep(self._clock.wall_s(_READY_POLL_S))
-
-    # -- in flight -----------------------------------------------------------------------------------------------
+    # -- the control loop ----------------------------------------------------------------------------------------
 
     async def _fly(self) -> None:
         await self._machine.trigger_named("advance")
@@ -172,18 +152,19 @@ class Executive:
         state = self._autopilot.state
         if state is None or self._task is None:
             raise RuntimeError("a flight without telemetry or task")
-        self._history.add(state)
+        self._was_armed = self._was_armed or state.is_armed
         self._log.record(state)
         self._keep_status_texts()
-        sight = self._look(now_ns)
-        self.progress = Progress(self._machine.state, self._machine.task_index, state, self._sight)
+        sight = self._guarded_look(now_ns, state)
+        self._show(state)
         if await self._react(now_ns, state):
             return
+        step = Step()
         try:
             step = self._task.step(self._reference, Observation(dt_s, state, sight))
             await self._do(step, state)
         except AutopilotError as error:
-            self._refusal = str(error)
+            self._note_refusal(str(error))
             return
         except Exception as error:
             self._internal_error = f"{type(error).__name__} in {self._machine.state}: {error}"
@@ -192,34 +173,36 @@ class Executive:
         if step.done is not None:
             await self._end_task(Result.COMPLETED, step.done)
 
-    def _look(self, now_ns: int) -> Sight | None:
+    def _guarded_look(self, now_ns: int, state: VehicleState) -> Sight | None:
         """The newest report since the last tick, on the map; the older ones are kept in the log alone."""
         reports = self._eyes.take()
         for report in reports:
             self._log.record(report)
-        sight = None
-        if reports:
+        try:
+            self._history.add(state)
+            if not reports:
+                return None
             sight = sight_of(reports[-1], self._history, self._group, self._camera, self._guidance, now_ns)
-        if sight is not None:
-            self._sight = sight
-            if sight.line is not None:
-                self._line_seen_ns = max(self._line_seen_ns, sight.t_capture_ns)
+        except Exception as error:
+            self._internal_error = f"{type(error).__name__} while placing the line: {error}"
+            return None
+        if sight is not None and sight.line is not None:
+            self._line_seen_ns = max(self._line_seen_ns, sight.t_capture_ns)
         return sight
 
     async def _do(self, step: Step, state: VehicleState) -> None:
         """Send what the task wants."""
-        now_ns = self._clock.now_ns()
-        if step.command is Command.TAKEOFF:
-            self._has_armed = True  # even when the answer gets lost: then it must come down again
-            await self._autopilot.arm()
-            await self._autopilot.takeoff(step.altitude_m)
-            self._modes.command(now_ns, FlightMode.TAKEOFF, FlightMode.HOLD)
+        if step.next_mode is not None:
+            self._modes.announce(step.next_mode)
+        if step.command is Command.ARM:
+            await self._arm(state)
+        elif step.command is Command.TAKEOFF:
+            await self._command(self._autopilot.takeoff(step.altitude_m), FlightMode.TAKEOFF)
         elif step.command is Command.RETURN:
-            await self._autopilot.return_home()
-            self._modes.command(now_ns, FlightMode.RETURN, FlightMode.LAND)  # its end may be shown as LAND
+            # Its end, the landing, may be shown as LAND.
+            await self._command(self._autopilot.return_home(), FlightMode.RETURN, FlightMode.LAND)
         elif step.command is Command.LAND:
-            await self._autopilot.land()
-            self._modes.command(now_ns, FlightMode.LAND)
+            await self._command(self._autopilot.land(), FlightMode.LAND)
         if step.setpoint is None:
             return
         if self._modes.is_offboard:
@@ -228,9 +211,34 @@ class Executive:
         else:
             # The first setpoint is where the vehicle is: entering offboard must not move it.
             self._reference = Setpoint(state.north_m, state.east_m, state.down_m, self._reference.yaw_rad)
-            await self._autopilot.start_offboard(self._reference)
-            self._modes.command(now_ns, FlightMode.OFFBOARD)
+            await self._command(self._autopilot.start_offboard(self._reference), FlightMode.OFFBOARD)
         self._log.record_setpoint(self._clock.now_ns(), self._reference)
+
+    async def _command(self, call: Awaitable[None], *modes: FlightMode) -> None:
+        """Send a command that leads to one of `modes`."""
+        self._modes.announce(*modes)
+        await call
+        self._modes.accept(self._clock.now_ns(), *modes)
+
+    async def _arm(self, state: VehicleState) -> None:
+        rest = not_at_rest(state)
+        if rest is not None:
+            raise AutopilotError(f"not armed: we wait for {rest}")
+        try:
+            self._was_told_to_arm = True
+            await self._autopilot.arm()
+        except NoAnswerError:
+            raise  # it may have armed all the same
+        except AutopilotError:
+            self._was_told_to_arm = False
+            raise
+
+    def _note_refusal(self, words: str) -> None:
+        """On the way down a refusal is noted, and the task asks again; before that it is a hazard."""
+        if isinstance(self._task, GoDownTask):
+            self._log.record(Event(self._clock.now_ns(), Hazard.COMMAND_REFUSED, Severity.WARNING, words))
+        else:
+            self._refusal = words
 
     # -- tasks ---------------------------------------------------------------------------------------------------
 
@@ -242,19 +250,18 @@ class Executive:
         self._task = build_task(plan, self._guidance, self._memory)
         self._task_started_ns = self._clock.now_ns()
         self._line_seen_ns = self._task_started_ns
-        self._may_be_over_line = self._may_be_over_line or plan.task in ("move_until", "align", "follow_lines")
+        self._may_be_over_line = self._may_be_over_line or plan.task not in _STAYS_CLEAR
         self._log.record(TaskStarted(self._task_started_ns, index, plan.task))
 
     async def _end_task(self, result: Result, reason: str) -> None:
-        """Close the task in the log; go on with the next one, or end the flight."""
-        now_ns = self._clock.now_ns()
+        """Close the task in the log; after a completed one go on with the next, or end the flight."""
         index = self._machine.task_index
         if index is not None:
-            self._log.record(TaskEnded(now_ns, index, self._plan.tasks[index].task, result, reason))
+            self._log.record(TaskEnded(self._clock.now_ns(), index, self._plan.tasks[index].task, result, reason))
         if result is not Result.COMPLETED:
             return
         if index is None:  # going down has ended: the mission ends as the reaction said
-            await self._machine.trigger_named(_ENDS[self._end[0]])
+            await self._machine.trigger_named(_TRIGGERS[self._end[0]])
             return
         await self._machine.trigger_named("advance")
         if self._machine.is_over:
@@ -265,40 +272,41 @@ class Executive:
 
     async def _react(self, now_ns: int, state: VehicleState) -> bool:
         """Find hazards and act on the most urgent; true when the task must not step in this tick."""
+        is_going_down = self._machine.state == m.GOING_DOWN
         hazards = find_hazards(self._safety_input(now_ns, state), self._limits)
-        if self._machine.state == m.GOING_DOWN:
-            # Already on the way down: only losing the vehicle, or the way down itself failing, changes anything.
-            hazards = {hazard: text for hazard, text in hazards.items() if hazard in _MATTERS_GOING_DOWN}
-            if set(hazards) == {Hazard.COMMAND_REFUSED} and self._may_retry_going_down():
-                return True
-        decision = decide(hazards, self._reactions)
-        for hazard in hazards:
+        if is_going_down:
+            hazards = keep_going_down(hazards)
+        decision = decide(hazards, self._reactions, is_offboard=self._modes.is_offboard)
+        for hazard, words in hazards.items():
             if hazard not in self._noted and (decision is None or hazard is not decision[0]):
                 self._noted.add(hazard)
-                self._log.record(Event(now_ns, hazard, Severity.WARNING, hazards[hazard]))
+                self._log.record(Event(now_ns, hazard, Severity.WARNING, words))
         if decision is None:
             return False
         hazard, reaction = decision
-        reason = f"{hazard.replace('_', ' ')}: {hazards[hazard]}"
-        if reaction is Reaction.GIVE_UP_CONTROL or self._machine.state == m.GOING_DOWN:
-            self._log.record(Event(now_ns, hazard, Severity.ERROR, hazards[hazard], Reaction.GIVE_UP_CONTROL))
-            await self._give_up(hazard, reason)
+        if is_going_down:
+            reaction = Reaction.GIVE_UP_CONTROL
+        reaction = way_down(reaction, may_be_over_line=self._may_be_over_line)
+        self._log.record(Event(now_ns, hazard, Severity.ERROR, hazards[hazard], reaction))
+        self._end = (_RESULTS.get(hazard, Result.FAILED), f"{hazard.replace('_', ' ')}: {hazards[hazard]}")
+        await self._end_task(*self._end)
+        if reaction is Reaction.GIVE_UP_CONTROL:
+            # Touch nothing more: the pilot, or the autopilot's own failsafe, has the vehicle.
+            await self._machine.trigger_named("give_up")
         else:
-            reaction = clear_of_the_line(reaction, may_be_over_line=self._may_be_over_line)
-            self._log.record(Event(now_ns, hazard, Severity.ERROR, hazards[hazard], reaction))
-            await self._go_down(hazard, reaction, reason)
+            await self._go_down(hazard, reaction)
         return True
 
     def _safety_input(self, now_ns: int, state: VehicleState) -> SafetyInput:
-        start = self._memory.start
         index = self._machine.task_index
         task = self._task
         return SafetyInput(
             now_ns=now_ns,
             state=state,
             allowed_modes=self._modes.explained(now_ns, state),
-            distance_m=math.hypot(state.north_m - start.north_m, state.east_m - start.east_m),
-            altitude_m=start.down_m - state.down_m,
+            distance_m=self._from_start_m(state),
+            altitude_m=self._memory.start.down_m - state.down_m,
+            was_armed=self._was_armed,
             is_going_down=isinstance(task, GoDownTask),
             task_age_s=(now_ns - self._task_started_ns) / NS_PER_S,
             task_limit_s=GOING_DOWN_LIMIT_S if index is None else self._plan.tasks[index].time_limit_s,
@@ -312,50 +320,43 @@ class Executive:
             is_interrupted=self._is_interrupted,
         )
 
-    async def _give_up(self, hazard: Hazard, reason: str) -> None:
-        """End our control and touch nothing: the pilot, or the autopilot's own failsafe, has the vehicle."""
-        result = Result.TAKEN_OVER if hazard is Hazard.TAKEOVER else Result.FAILED
-        self._end = (result, reason)
-        await self._end_task(result, reason)
-        await self._machine.trigger_named("give_up")
-
-    async def _go_down(self, hazard: Hazard, reaction: Reaction, reason: str) -> None:
+    async def _go_down(self, hazard: Hazard, reaction: Reaction) -> None:
         """End the mission early: hold for a moment, then land or return."""
-        result = {Hazard.INTERRUPTED: Result.INTERRUPTED, Hazard.TASK_TIMED_OUT: Result.TIMED_OUT}.get(
-            hazard, Result.FAILED
-        )
-        self._end = (result, reason)
-        await self._end_task(result, reason)
         await self._machine.trigger_named("go_down")
-        self._refusal = None
-        self._task_failure = None
+        self._refusal = self._task_failure = self._internal_error = None
         self._task_started_ns = self._clock.now_ns()
-        self._internal_error = None
-        if not self._has_armed:
-            await self._machine.trigger_named(_ENDS[result])
+        if not self.may_have_armed:
+            await self._machine.trigger_named(_TRIGGERS[self._end[0]])
             return
-        self._way_down = Command.LAND if reaction is Reaction.LAND else Command.RETURN
-        if isinstance(self._task, GoDownTask) and self._task.command in (self._way_down, Command.LAND):
+        command = Command.LAND if reaction is Reaction.LAND else Command.RETURN
+        task = self._task
+        is_healthy = hazard not in (Hazard.INTERNAL_ERROR, Hazard.TASK_TIMED_OUT)
+        if isinstance(task, GoDownTask) and is_healthy and task.command in (command, Command.LAND):
             return  # it is on that way already
-        self._task = GoDownTask(self._way_down, PAUSE_BEFORE_GOING_DOWN_S)
+        self._task = GoDownTask(command, PAUSE_BEFORE_GOING_DOWN_S)
         try:
-            await self._autopilot.hold()
-            self._modes.command(self._clock.now_ns(), FlightMode.HOLD)
+            await self._command(self._autopilot.hold(), FlightMode.HOLD)
         except AutopilotError as error:  # then the way down is all the more urgent, and goes on
-            self._log.record(Event(self._clock.now_ns(), Hazard.COMMAND_REFUSED, Severity.WARNING, str(error)))
+            self._note_refusal(str(error))
 
-    def _may_retry_going_down(self) -> bool:
-        """Once more the same way down, after a command for it was refused or not answered; false after the third."""
-        self._n_refusals += 1
-        self._refusal = None
-        self._task = GoDownTask(self._way_down)
-        return self._n_refusals < _MAX_REFUSALS
+    # -- what others hear ----------------------------------------------------------------------------------------
 
-    # -- the log -------------------------------------------------------------------------------------------------
+    def _from_start_m(self, state: VehicleState) -> float:
+        start = self._memory.start
+        return math.hypot(state.north_m - start.north_m, state.east_m - start.east_m)
+
+    def _show(self, state: VehicleState) -> None:
+        height_m = self._memory.start.down_m - state.down_m
+        self.progress = Progress(
+            self._machine.state, self._machine.task_index, height_m, self._from_start_m(state), state.yaw_rad
+        )
 
     def _keep_status_texts(self) -> None:
         for text in self._autopilot.drain_status_texts():
             self._log.record_status_text(self._clock.now_ns(), text)
 
     def _on_change(self, state: str) -> None:
-        self.progress = Progress(state, self._machine.task_index, self.progress.state, self.progress.sight)
+        before = self.progress
+        self.progress = Progress(
+            state, self._machine.task_index, before.height_m, before.distance_m, before.heading_rad
+        )

@@ -22,6 +22,9 @@ from mission.reporting import Progress
 from mission.worker_eyes import WorkerEyes
 from vision.worker import VisionWorker
 
+STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+"""Ctrl-C, a service manager's stop, and a terminal or an SSH session that goes away."""
+
 _PROGRESS_RATE_HZ = 5.0
 _TRUTH_RATE_HZ = 20.0
 _POSE_RATE_HZ = 100.0
@@ -48,16 +51,19 @@ class FlightSetup:
 
 @dataclass(frozen=True, slots=True)
 class FlightOutcome:
-    """How the flight ended, whether the vehicle was ever armed, and where its log is (and if it is whole)."""
+    """How the flight ended, whether the vehicle may have been armed, and where its log is.
+
+    `log_failure` says in a sentence why the log is not whole; None where it is.
+    """
 
     ended: MissionEnded
-    has_armed: bool
+    may_have_armed: bool
     log: Path
     log_failure: str | None
 
 
 async def fly(setup: FlightSetup, on_progress: Callable[[Progress], None]) -> FlightOutcome:
-    """Fly the mission. SIGINT and SIGTERM end it by the mission's reaction, not by killing this process.
+    """Fly the mission. STOP_SIGNALS end it by the mission's reaction, not by killing this process.
 
     Raises LogError when the log cannot be made; then nothing was connected.
     """
@@ -90,7 +96,7 @@ async def fly(setup: FlightSetup, on_progress: Callable[[Progress], None]) -> Fl
                 await autopilot.close()
                 worker.stop()
         on_progress(executive.progress)
-    return FlightOutcome(ended, executive.has_armed, path, recorder.failure)
+    return FlightOutcome(ended, executive.may_have_armed, path, recorder.failure)
 
 
 async def _every(rate_hz: float, speed: float, act: Callable[[], None]) -> None:
@@ -119,12 +125,12 @@ async def _feed(feed_pose: Callable[[VehicleState], None], autopilot: MavsdkAuto
 
 @contextlib.contextmanager
 def _stop_signals(stop: Callable[[], None]) -> Iterator[None]:
-    """Let Ctrl-C and a service manager's stop end the flight in order; again and again if pressed again."""
+    """Let STOP_SIGNALS end the flight in order, however often they come."""
     loop = asyncio.get_running_loop()
-    for number in (signal.SIGINT, signal.SIGTERM):
+    for number in STOP_SIGNALS:
         loop.add_signal_handler(number, stop)
     try:
         yield
     finally:
-        for number in (signal.SIGINT, signal.SIGTERM):
+        for number in STOP_SIGNALS:
             loop.remove_signal_handler(number)

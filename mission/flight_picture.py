@@ -5,6 +5,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from mission.log.errors import LogError
 from mission.log.picture import draw_summary, flight_view
 from mission.log.reader import read_flight
 from mission.log.summary import summarise
@@ -12,11 +13,24 @@ from mission.log.track_map import MapBackground
 from mission.simulation import World, draw_map
 
 
+class PictureError(Exception):
+    """The picture of a flight could not be made; the message is one sentence."""
+
+
 def write_picture(log: Path, world: World | None) -> Path:
     """Draw the flight of a log as `<log>.png`; `world` gives its ground where it was simulated.
 
-    Raises LogError for a log that cannot be read, OSError where the picture cannot be written.
+    Raises PictureError with one sentence when it cannot be drawn or written.
     """
+    file = log.with_suffix(".png")
+    try:
+        file.write_bytes(_draw(log, world))
+    except (LogError, OSError, ValueError, cv2.error) as error:
+        raise PictureError(f"The picture {file} cannot be drawn: {error}.") from error
+    return file
+
+
+def _draw(log: Path, world: World | None) -> bytes:
     flight = read_flight(log, with_images=True)
     background = None
     if world is not None:
@@ -24,6 +38,4 @@ def write_picture(log: Path, world: World | None) -> Path:
         background = MapBackground(draw_map(world, view.bounds_ne_m, view.px_per_m), view.bounds_ne_m)
     image = draw_summary(flight, summarise(flight), background)
     _, encoded = cv2.imencode(".png", np.asarray(image))
-    file = log.with_suffix(".png")
-    file.write_bytes(encoded.tobytes())
-    return file
+    return encoded.tobytes()

@@ -4,9 +4,12 @@ Every key carries its unit; angles are degrees here, because people write them (
 the program that keeps degrees). Names r, epsilon, P and theta_0 are [Ceron]'s, Algorithms 6.1 to 6.3.
 """
 
-from typing import Annotated, Literal, get_args
+from typing import Annotated, Literal, Self, get_args
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic_core import PydanticCustomError
+
+from mission.plan_rules import DEFAULT_TAKEOFF_M
 
 Metres = Annotated[float, Field(gt=0, le=1000)]
 AltitudeM = Annotated[float, Field(ge=1, le=120)]
@@ -23,7 +26,7 @@ class Takeoff(_Section):
     """Arm and climb straight up in the autopilot's own take-off mode."""
 
     task: Literal["takeoff"]
-    altitude_m: AltitudeM = Field(5.0, description="Height above the take-off point.")
+    altitude_m: AltitudeM = Field(DEFAULT_TAKEOFF_M, description="Height above the take-off point.")
     time_limit_s: TimeLimitS = 60.0
 
 
@@ -209,6 +212,16 @@ class SafetyPlan(_Section):
     battery_low_percent: float = Field(25.0, ge=5, le=90)
     battery_critical_percent: float = Field(12.0, ge=2, le=90)
     reactions: Reactions = Reactions()
+
+    @model_validator(mode="after")
+    def _critical_is_below_low(self) -> Self:
+        if self.battery_critical_percent >= self.battery_low_percent:
+            raise PydanticCustomError(
+                "battery_order",
+                "battery_critical_percent below battery_low_percent = {low:g}",
+                {"low": self.battery_low_percent},
+            )
+        return self
 
 
 class MissionPlan(_Section):

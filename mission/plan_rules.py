@@ -6,6 +6,7 @@ The rules work on the raw tasks, so that they report together with the errors of
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+DEFAULT_TAKEOFF_M = 5.0
 LANDING_TASKS = ("land", "return")
 
 
@@ -66,6 +67,8 @@ def _check_altitudes(tasks: Sequence[object], max_altitude_m: object) -> list[Ru
     current_m: float | None = None
     for index, item in enumerate(tasks):
         altitude_m = item.get("altitude_m") if isinstance(item, Mapping) else None
+        if altitude_m is None and isinstance(item, Mapping) and item.get("task") == "takeoff":
+            altitude_m = DEFAULT_TAKEOFF_M
         if not isinstance(item, Mapping) or isinstance(altitude_m, bool) or not isinstance(altitude_m, int | float):
             continue
         where = ("tasks", index, "altitude_m")

@@ -3,8 +3,7 @@
 from dataclasses import dataclass
 from typing import Protocol
 
-from mission.autopilot import Setpoint, VehicleState
-from mission.tasks.task import Sight
+from mission.autopilot import Setpoint
 
 
 class FlightLog(Protocol):
@@ -25,10 +24,14 @@ class FlightLog(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class Progress:
-    """Where the flight stands now; `task_index` is None outside the mission's tasks."""
+    """Where the flight stands now; `task_index` is None outside the mission's tasks.
+
+    Height and distance are from the take-off point [m], the heading from north [rad]; None before take-off.
+    """
 
     stage: str
     task_index: int | None
-    state: VehicleState | None
-    sight: Sight | None
+    height_m: float | None
+    distance_m: float | None
+    heading_rad: float | None = None
     waiting_for: tuple[str, ...] = ()

@@ -26,6 +26,7 @@ class Hazard(enum.StrEnum):
     """Everything that safety watches for."""
 
     TAKEOVER = "takeover"
+    DISARMED = "disarmed"
     LINK_LOST = "link_lost"
     TELEMETRY_STALE = "telemetry_stale"
     COMMAND_REFUSED = "command_refused"
@@ -46,6 +47,8 @@ PRIORITY: tuple[Hazard, ...] = tuple(Hazard)
 FIXED_REACTIONS: Mapping[Hazard, Reaction] = {
     # The pilot has the vehicle.
     Hazard.TAKEOVER: Reaction.GIVE_UP_CONTROL,
+    # A kill switch, or the autopilot: whoever arms again must not meet our setpoints.
+    Hazard.DISARMED: Reaction.GIVE_UP_CONTROL,
     # Nothing we send arrives, or nothing tells us what it does: the autopilot's own failsafe acts when we fall silent.
     Hazard.LINK_LOST: Reaction.GIVE_UP_CONTROL,
     Hazard.TELEMETRY_STALE: Reaction.GIVE_UP_CONTROL,
@@ -73,9 +76,10 @@ class SafetyInput:
     """What safety looks at in one tick. Distances are from the take-off point, times are flight time.
 
     `allowed_modes` are the flight modes that our own last command explains, and `is_going_down` says that it was to
-    land or to return. `needs_line` is true for tasks that steer by the line, and `line_seen_ns` is the capture time of
-    the newest estimate, or the task's start before the first. `task_failure`, `refusal` (of a command, by the
-    autopilot) and `internal_error` are sentences, None where all is well.
+    land or to return; `was_armed` that the vehicle was seen armed in this flight. `needs_line` is true for tasks that
+    steer by the line, and `line_seen_ns` is the capture time of the newest estimate, or the task's start before the
+    first. `task_failure`, `refusal` (of a command, by the autopilot) and `internal_error` are sentences, None where all
+    is well.
     """
 
     now_ns: int
@@ -83,6 +87,7 @@ class SafetyInput:
     allowed_modes: frozenset[FlightMode]
     distance_m: float
     altitude_m: float
+    was_armed: bool
     is_going_down: bool
     task_age_s: float
     task_limit_s: float
@@ -104,7 +109,9 @@ def find_hazards(seen: SafetyInput, limits: SafetyLimits) -> dict[Hazard, str]:
     battery = math.inf if state.battery is None else state.battery
     found: dict[Hazard, str] = {}
     if state.mode not in seen.allowed_modes:
-        found[Hazard.TAKEOVER] = f"the vehicle went to {state.mode} mode, which we did not command"
+        found[Hazard.TAKEOVER] = f"the vehicle is in {state.mode} mode, which our last command does not explain"
+    if seen.was_armed and not state.is_armed and not seen.is_going_down:
+        found[Hazard.DISARMED] = "the vehicle was disarmed in mid-mission"
     if not state.is_connected:
         found[Hazard.LINK_LOST] = "the autopilot's heartbeat is missing"
     elif age_s > limits.telemetry_stale_s:
@@ -138,21 +145,32 @@ def find_hazards(seen: SafetyInput, limits: SafetyLimits) -> dict[Hazard, str]:
     return {hazard: found[hazard] for hazard in PRIORITY if hazard in found}
 
 
-def decide(hazards: Mapping[Hazard, str], reactions: Mapping[Hazard, Reaction]) -> tuple[Hazard, Reaction] | None:
+def decide(
+    hazards: Mapping[Hazard, str], reactions: Mapping[Hazard, Reaction], *, is_offboard: bool
+) -> tuple[Hazard, Reaction] | None:
     """The hazard that decides and its reaction; None when nothing has to be done.
 
     `reactions` are the mission's; FIXED_REACTIONS go before them. A hazard whose reaction is to continue never hides
-    one that asks for more.
+    one that asks for more. Outside offboard the autopilot does not miss us: a lost link is then answered by trying to
+    bring the vehicle down.
     """
     for hazard in PRIORITY:
         if hazard in hazards:
             reaction = FIXED_REACTIONS[hazard] if hazard in FIXED_REACTIONS else reactions[hazard]
+            if hazard in (Hazard.LINK_LOST, Hazard.TELEMETRY_STALE) and not is_offboard:
+                reaction = Reaction.LAND_CLEAR
             if reaction is not Reaction.CONTINUE:
                 return hazard, reaction
     return None
 
 
-def clear_of_the_line(reaction: Reaction, *, may_be_over_line: bool) -> Reaction:
+def keep_going_down(hazards: Mapping[Hazard, str]) -> dict[Hazard, str]:
+    """The hazards that still matter once the vehicle is on its way down: the others have had their reaction."""
+    matters = (Hazard.TAKEOVER, Hazard.INTERNAL_ERROR, Hazard.TASK_TIMED_OUT)
+    return {hazard: words for hazard, words in hazards.items() if hazard in matters}
+
+
+def way_down(reaction: Reaction, *, may_be_over_line: bool) -> Reaction:
     """Resolve LAND_CLEAR: land here, unless the line may be below: then return, which lands where we took off."""
     if reaction is not Reaction.LAND_CLEAR:
         return reaction

@@ -1,5 +1,6 @@
 """The simulated vehicle beside the mission: its process, its camera and its truth. The only file that imports sitl."""
 
+import contextlib
 import functools
 import math
 import multiprocessing
@@ -29,6 +30,9 @@ from sitl.server import SitlSettings, SitlSummary, run
 from sitl.world import World, WorldError, load_world
 
 __all__ = ["Simulation", "TelemetryCamera", "World", "WorldError", "draw_map", "serve_until_stopped", "true_line"]
+
+VEHICLE_PORT_ABOVE = 40
+"""The simulated vehicle binds this far above the application's port, as PX4 SITL does (14580 and 14540)."""
 
 _STOP_TIMEOUT_S = 5.0
 
@@ -70,17 +74,21 @@ class Simulation:
 
     def __enter__(self) -> Self:
         self._process.start()
+        self._child_summaries.close()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self._stop.set()
-        if self._summaries.poll(_STOP_TIMEOUT_S):
-            self.summary = self._summaries.recv()
+        with contextlib.suppress(EOFError):  # it died without a word: then there is no summary
+            if self._summaries.poll(_STOP_TIMEOUT_S):
+                self.summary = self._summaries.recv()
         self._process.join(_STOP_TIMEOUT_S)
         if self._process.is_alive():
             self._process.kill()
+            self._process.join()
+        self._summaries.close()
         self._poses.close()
 
 
@@ -123,9 +131,7 @@ def sitl_settings(
         wind_m_s=wind_m_s,
         clock=clock,
         start_yaw_rad=world.start_yaw_rad,
-        latitude_deg=math.degrees(world.origin.latitude_rad),
-        longitude_deg=math.degrees(world.origin.longitude_rad),
-        altitude_m=world.origin.altitude_m,
+        origin=world.origin,
         pose_block=pose_block,
     )
 
@@ -148,10 +154,17 @@ def draw_map(world: World, bounds_ne_m: tuple[float, float, float, float], px_pe
 
 
 def free_udp_port() -> int:
-    """A UDP port that nobody on this machine uses now."""
-    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
+    """A UDP port that nobody on this machine uses now, for the application; the vehicle's own is VEHICLE_PORT_ABOVE."""
+    while True:
+        with (
+            socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as application,
+            socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as vehicle,
+        ):
+            application.bind(("127.0.0.1", 0))
+            port = int(application.getsockname()[1])
+            with contextlib.suppress(OSError, OverflowError):
+                vehicle.bind(("127.0.0.1", port + VEHICLE_PORT_ABOVE))
+                return port
 
 
 def serve_until_stopped(world: str | None, speed: float, port: int, seed: int, wind_m_s: float) -> SitlSummary:
@@ -165,8 +178,8 @@ def serve_until_stopped(world: str | None, speed: float, port: int, seed: int, w
 
 def _serve(settings: SitlSettings, stop: ProcessEvent, summaries: Connection) -> None:
     # Ctrl-C reaches every process of the terminal: the vehicle must go on flying until the mission has landed it.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)
     parent = os.getppid()
     summaries.send(run(settings, lambda: stop.is_set() or os.getppid() != parent))
 

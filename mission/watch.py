@@ -1,6 +1,8 @@
 """Showing a flight while it goes on: a live line in a terminal, else a line for each stage."""
 
+import contextlib
 import math
+import threading
 from types import TracebackType
 from typing import Self
 
@@ -8,38 +10,58 @@ from rich.console import Console
 from rich.live import Live
 from rich.text import Text
 
+from drivers.camera.mailbox import Mailbox
 from mission.plan import MissionPlan
 from mission.reporting import Progress
 
+_POLL_S = 0.2
+_LAST_WORD_S = 1.0
+
 
 class Watch:
-    """A context manager; `show` is called a few times a second."""
+    """A context manager; `show` may be called as often as one likes.
+
+    It prints from a thread of its own and keeps the newest progress only: a terminal that does not take its output, as
+    after Ctrl-S or on a stalled SSH link, must never hold up the control loop.
+    """
 
     def __init__(self, plan: MissionPlan, console: Console) -> None:
         self._plan = plan
         self._console = console
-        self._stage: str | None = None
-        self._waiting_for: tuple[str, ...] = ()
+        self._shown: tuple[str, tuple[str, ...]] | None = None
         self._live = Live(console=console, auto_refresh=False, transient=True) if console.is_terminal else None
+        self._news: Mailbox[Progress] = Mailbox()
+        self._thread = threading.Thread(target=self._print_all, name="watch", daemon=True)
+
+    def show(self, progress: Progress) -> None:
+        """Show where the flight stands, soon; never waits."""
+        self._news.put(progress)
 
     def __enter__(self) -> Self:
-        if self._live is not None:
-            self._live.start()
+        self._thread.start()
         return self
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if self._live is not None:
-            self._live.stop()
+        self._news.close()
+        self._thread.join(_LAST_WORD_S)
 
-    def show(self, progress: Progress) -> None:
-        """Show where the flight stands."""
+    def _print_all(self) -> None:
+        # EOFError: closed. OSError: the terminal is gone, and nobody watches any more.
+        with contextlib.suppress(EOFError, OSError), self._live or contextlib.nullcontext():
+            while True:
+                progress = self._news.get(_POLL_S)
+                if progress is not None:
+                    self._print(progress)
+
+    def _print(self, progress: Progress) -> None:
         if self._live is not None:
             self._live.update(self._line(progress), refresh=True)
-        if progress.stage != self._stage or progress.waiting_for != self._waiting_for:
-            is_news = progress.stage != self._stage or bool(progress.waiting_for)
-            self._stage, self._waiting_for = progress.stage, progress.waiting_for
+        now = (progress.stage, progress.waiting_for)
+        if now != self._shown:
+            is_news = self._shown is None or self._shown[0] != progress.stage or bool(progress.waiting_for)
+            self._shown = now
             if is_news:
                 self._console.print(self._line(progress), soft_wrap=True, highlight=False)
 
@@ -49,11 +71,8 @@ class Watch:
         line = Text.assemble((f"{number:>6}", "dim"), (f"{name:<14}", "bold"))
         if progress.waiting_for:
             line.append("waiting for " + ", ".join(progress.waiting_for), "yellow")
-        elif progress.state is not None:
-            state = progress.state
-            line.append(f"{-state.down_m:5.1f} m up  {math.hypot(state.north_m, state.east_m):5.1f} m out", "cyan")
-            line.append(f"  heading {math.degrees(state.yaw_rad) % 360:3.0f}", "cyan")
-            estimate = None if progress.sight is None else progress.sight.estimate
-            if estimate is not None:
-                line.append(f"  line at {math.degrees(estimate.angle_rad):+5.1f}", "green")
+        elif progress.height_m is not None and progress.distance_m is not None:
+            line.append(f"{progress.height_m:5.1f} m up  {progress.distance_m:5.1f} m out", "cyan")
+            if progress.heading_rad is not None:
+                line.append(f"  heading {math.degrees(progress.heading_rad) % 360:3.0f}", "cyan")
         return line

@@ -55,8 +55,8 @@ def run_worker(
     Sends WorkerReady, a VisionReport for each frame, and WorkerFailed when the camera or the pipeline fails.
     """
     # Ctrl-C and a service manager's stop reach every process of the group; only the parent knows when to stop us.
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
-    signal.signal(signal.SIGTERM, signal.SIG_IGN)
+    for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
+        signal.signal(number, signal.SIG_IGN)
     cv2.setNumThreads(1)
     stop = threading.Event()
     threading.Thread(target=_watch_lifeline, args=(lifeline, stop), name="lifeline", daemon=True).start()

@@ -7,7 +7,7 @@ from pydantic import TypeAdapter
 
 from drivers.clock import NS_PER_S
 from mission.autopilot import VehicleState
-from mission.log.records import MissionFile, SentSetpoint, StatusText, VisionEntry
+from mission.log.records import LoggedMission, SentSetpoint, StatusText, VisionEntry
 from mission.records import Event, MissionEnded, TaskEnded, TaskStarted, TrueLine, TruePose
 
 PROFILE = "lineflight"
@@ -39,7 +39,7 @@ class FoxgloveChannel:
 
 
 RECORD_CHANNELS = (
-    RecordChannel("/mission", MissionFile, "the mission file, and how log times belong to flight times", "once"),
+    RecordChannel("/mission", LoggedMission, "the mission file, and how log times belong to flight times", "once"),
     RecordChannel("/vehicle/state", VehicleState, "the vehicle as telemetry tells it", "every control tick"),
     RecordChannel("/setpoint", SentSetpoint, "the offboard setpoints", "every control tick while offboard"),
     RecordChannel("/vision/report", VisionEntry, "line estimates and power lines", "every frame worked on"),

@@ -5,7 +5,7 @@ import re
 from datetime import UTC, datetime
 from pathlib import Path
 
-from mission.log.records import LogError
+from mission.log.errors import LogError
 
 
 def log_path(folder: Path, mission_name: str, start: datetime) -> Path:

@@ -15,7 +15,8 @@ from mcap.stream_reader import StreamReader
 
 from mission.autopilot import VehicleState
 from mission.log import channels
-from mission.log.records import LogError, MissionFile, SentSetpoint, StatusText, VisionEntry
+from mission.log.errors import LogError
+from mission.log.records import LoggedMission, SentSetpoint, StatusText, VisionEntry
 from mission.records import Event, MissionEnded, TaskEnded, TaskStarted, TrueLine, TruePose
 from vision.records import VisionReport
 
@@ -36,7 +37,7 @@ class Flight:
     """
 
     path: Path
-    mission: MissionFile
+    mission: LoggedMission
     states: tuple[VehicleState, ...]
     setpoints: tuple[SentSetpoint, ...]
     reports: tuple[VisionReport, ...]
@@ -83,7 +84,7 @@ def _read(path: Path, file: BinaryIO, with_images: bool) -> Flight:
                 jpegs[log_time_ns] = _bytes_field(body, _IMAGE_DATA_FIELD)
     except Exception as error:  # the decompressor, the decoder and the parser each have their own
         raise LogError(f"The log {path} is damaged ({type(error).__name__}: {error}); recover it with mcap.") from error
-    if not streams[MissionFile]:
+    if not streams[LoggedMission]:
         raise LogError(f"{path} holds no mission; it is not the log of a flight, or was cut off at its very start.")
     return _flight(path, streams, jpegs, is_truncated=not is_closed)
 
@@ -91,7 +92,7 @@ def _read(path: Path, file: BinaryIO, with_images: bool) -> Flight:
 def _flight(path: Path, streams: dict[type, list[Any]], jpegs: dict[int, bytes], *, is_truncated: bool) -> Flight:
     for records in streams.values():
         records.sort(key=lambda record: getattr(record, "t_ns", 0))
-    mission: MissionFile = streams[MissionFile][0]
+    mission: LoggedMission = streams[LoggedMission][0]
     offset_ns = mission.unix_minus_flight_ns
     times_ns = [records[-1].t_ns for records in streams.values() if records and hasattr(records[-1], "t_ns")]
     ended, lines = streams[MissionEnded], streams[TrueLine]

@@ -21,7 +21,7 @@ from mission.autopilot import Setpoint, VehicleState
 from mission.log import channels
 from mission.log.backlog import Backlog
 from mission.log.disk import LogFile
-from mission.log.records import MissionFile, SentSetpoint, StatusText, VisionEntry
+from mission.log.records import LoggedMission, SentSetpoint, StatusText, VisionEntry
 from mission.log.wording import line_of
 from mission.records import Event, MissionEnded, Severity, TaskEnded, TaskStarted, TrueLine, TruePose
 from vision.records import VisionReport
@@ -63,7 +63,7 @@ class Recorder:
         self.path = path
         self._clock = ScaledClock() if clock is None else clock
         start_ns = self._clock.now_ns()
-        self._mission = MissionFile(
+        self._mission = LoggedMission(
             name=mission_name,
             text=mission_text,
             sha256=hashlib.sha256(mission_text.encode()).hexdigest(),
@@ -79,7 +79,16 @@ class Recorder:
     @property
     def failure(self) -> str | None:
         """Why the log is not complete, in a sentence; None while it is."""
-        return self._fault or (self._file.failure if self._file is not None else None)
+        if self._fault is not None:
+            return self._fault
+        if self._file is not None and self._file.failure is not None:
+            return self._file.failure
+        if self._backlog.n_dropped_records or self._backlog.n_dropped_images:
+            return (
+                f"The disk was too slow for the log {self.path}: {self._backlog.n_dropped_records} records and "
+                f"{self._backlog.n_dropped_images} images are missing."
+            )
+        return None
 
     @property
     def n_dropped_images(self) -> int:
@@ -115,6 +124,8 @@ class Recorder:
     ) -> None:
         self._backlog.close()
         self._thread.join(_CLOSE_TIMEOUT_S)
+        if self._thread.is_alive() and self._fault is None:
+            self._fault = f"The log {self.path} was not finished: the disk did not take it in {_CLOSE_TIMEOUT_S:g} s."
 
     def _write_all(self) -> None:
         # Whatever goes wrong here, a bug included, must not end a flight: it becomes `failure`.
@@ -146,7 +157,7 @@ class Recorder:
 class _FlightLog:
     """The MCAP writer: each record goes to its own JSON channel, and where a viewer can show it, to Foxglove's."""
 
-    def __init__(self, file: LogFile, mission: MissionFile) -> None:
+    def __init__(self, file: LogFile, mission: LoggedMission) -> None:
         context = self._context = foxglove.Context()  # its channels close when it goes
         # Without seeking, a chunk is written whole once it is full: a file cut anywhere holds only whole chunks.
         options = MCAPWriteOptions(
@@ -245,7 +256,7 @@ class _FlightLog:
         )
         self._show(channels.TRANSFORM, state.t_ns, transform)
 
-    def write_mission(self, mission: MissionFile) -> None:
+    def write_mission(self, mission: LoggedMission) -> None:
         self.write_plain(mission)
         world = fox.FrameTransform(
             timestamp=self._stamp(self._start_ns),
@@ -279,7 +290,7 @@ class _FlightLog:
 
 
 _WRITE: dict[type, Callable[[_FlightLog, Any], None]] = {
-    MissionFile: _FlightLog.write_mission,
+    LoggedMission: _FlightLog.write_mission,
     VehicleState: _FlightLog.write_state,
     SentSetpoint: _FlightLog.write_plain,
     VisionReport: _FlightLog.write_vision,

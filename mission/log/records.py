@@ -5,12 +5,8 @@ from dataclasses import dataclass
 from vision.records import LineEstimate
 
 
-class LogError(Exception):
-    """A log could not be written or read; the message is one sentence for a person."""
-
-
 @dataclass(frozen=True, slots=True)
-class MissionFile:
+class LoggedMission:
     """What was flown, and how the log's two times belong together.
 
     `text` is the mission file as it was read and `sha256` the hex digest of its UTF-8 bytes. Records carry flight time

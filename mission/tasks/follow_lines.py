@@ -11,6 +11,7 @@ from mission.guidance import (
     step_sideways,
     turn_towards_rad,
 )
+from mission.tasks.odometer import NEARLY_M, Odometer
 from mission.tasks.task import Observation, Step, is_there
 
 
@@ -27,7 +28,7 @@ class FollowLinesTask:
     def __init__(self, distance_m: float, guidance: GuidanceSettings) -> None:
         self._distance_m = distance_m
         self._guidance = guidance
-        self._moved_m = 0.0
+        self._odometer = Odometer()
         self._target_rad: float | None = None
         self._line: WorldLine | None = None
         self._unseen_s = 0.0
@@ -48,13 +49,13 @@ class FollowLinesTask:
             )
             setpoint = replace(reference, yaw_rad=yaw_rad)
         is_blind = self._unseen_s > guidance.max_estimate_age_s  # then wait for the line, or for the line_lost event
-        step_m = 0.0 if is_blind else min(guidance.r_m_s * seen.dt_s, self._distance_m - self._moved_m)
-        self._moved_m += step_m
+        left_m = self._distance_m - self._odometer.update(reference, reference.yaw_rad)
+        step_m = 0.0 if is_blind else min(guidance.r_m_s * seen.dt_s, max(0.0, left_m))
         setpoint = step_along(setpoint, setpoint.yaw_rad, step_m)
         if guidance.is_centred and self._line is not None:
             setpoint = step_sideways(
                 setpoint, self._line, setpoint.yaw_rad, guidance.lateral_per_s, guidance.lateral_max_m_s, seen.dt_s
             )
-        if self._moved_m >= self._distance_m and is_there(seen.state, setpoint, guidance.arrival_m):
+        if left_m <= NEARLY_M and is_there(seen.state, setpoint, guidance.arrival_m):
             return Step(setpoint, done=f"followed the line for {self._distance_m:g} m")
         return Step(setpoint)

@@ -2,6 +2,7 @@
 
 from mission.autopilot import Setpoint
 from mission.guidance import GuidanceSettings, step_along
+from mission.tasks.odometer import NEARLY_M, Odometer
 from mission.tasks.task import FlightMemory, Observation, Step, is_there
 
 
@@ -15,16 +16,16 @@ class MoveForwardTask:
         self._distance_m = distance_m
         self._guidance = guidance
         self._memory = memory
-        self._moved_m = 0.0
+        self._odometer = Odometer()
 
     def step(self, reference: Setpoint, seen: Observation) -> Step:
         """Move the reference by r dt, at most by what is left."""
         distance_m = self._memory.move_until_m if self._distance_m is None else self._distance_m
         if distance_m is None:
             return Step(reference, failed="move_until took no distance that could be flown back")
-        step_m = min(self._guidance.r_m_s * seen.dt_s, distance_m - self._moved_m)
-        self._moved_m += step_m
+        left_m = distance_m - self._odometer.update(reference, reference.yaw_rad)
+        step_m = min(self._guidance.r_m_s * seen.dt_s, max(0.0, left_m))
         setpoint = step_along(reference, reference.yaw_rad, step_m)
-        if self._moved_m >= distance_m and is_there(seen.state, setpoint, self._guidance.arrival_m):
+        if left_m <= NEARLY_M and is_there(seen.state, setpoint, self._guidance.arrival_m):
             return Step(setpoint, done=f"moved {distance_m:.1f} m")
         return Step(setpoint)

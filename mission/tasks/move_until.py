@@ -4,6 +4,7 @@ import math
 
 from mission.autopilot import Setpoint
 from mission.guidance import GuidanceSettings, step_along
+from mission.tasks.odometer import NEARLY_M, Odometer
 from mission.tasks.task import FlightMemory, Observation, Step, is_there
 
 
@@ -31,27 +32,27 @@ class MoveUntilTask:
         self._is_overhead = is_overhead
         self._guidance = guidance
         self._memory = memory
-        self._moved_m = 0.0
+        self._odometer = Odometer()
         self._n_in_a_row = 0
         self._goal_m: float | None = None
 
     def step(self, reference: Setpoint, seen: Observation) -> Step:
         """Move the reference along theta_0, or to where the line crosses the way once that is known."""
         heading_rad = self._memory.theta_0_rad
+        moved_m = self._odometer.update(reference, heading_rad)
         self._look(reference, seen, heading_rad)
         limit_m = self._guidance.r_m_s * seen.dt_s
         goal_m = self._max_distance_m if self._goal_m is None else self._goal_m
-        step_m = max(-limit_m, min(limit_m, goal_m - self._moved_m))
-        self._moved_m += step_m
+        step_m = max(-limit_m, min(limit_m, goal_m - moved_m))
         setpoint = step_along(reference, heading_rad, step_m)
         if self._goal_m is None:
-            if self._moved_m >= self._max_distance_m and is_there(seen.state, setpoint, self._guidance.arrival_m):
+            if moved_m >= self._max_distance_m - NEARLY_M and is_there(seen.state, setpoint, self._guidance.arrival_m):
                 return Step(setpoint, failed=f"no line within {self._max_distance_m:g} m")
             return Step(setpoint)
-        if abs(self._goal_m - self._moved_m) < limit_m and is_there(seen.state, setpoint, self._guidance.arrival_m):
+        if abs(self._goal_m - moved_m) < limit_m and is_there(seen.state, setpoint, self._guidance.arrival_m):
             self._memory.move_until_m = self._from_start_m(setpoint, heading_rad)
             where = "over the line" if self._is_overhead else "the line is in sight"
-            return Step(setpoint, done=f"{where} after {self._moved_m:.1f} m")
+            return Step(setpoint, done=f"{where} after {moved_m:.1f} m")
         return Step(setpoint)
 
     def _from_start_m(self, setpoint: Setpoint, heading_rad: float) -> float:
@@ -79,6 +80,6 @@ class MoveUntilTask:
             if self._goal_m is None:  # where the vehicle is: the setpoint runs ahead of it
                 lag_north_m, lag_east_m = seen.state.north_m - reference.north_m, seen.state.east_m - reference.east_m
                 lag_m = lag_north_m * math.cos(heading_rad) + lag_east_m * math.sin(heading_rad)
-                self._goal_m = self._moved_m + min(0.0, lag_m)
+                self._goal_m = self._odometer.moved_m + min(0.0, lag_m)
         elif sight.is_whole or self._goal_m is None:
-            self._goal_m = min(self._moved_m + crossing_m, self._max_distance_m)
+            self._goal_m = min(self._odometer.moved_m + crossing_m, self._max_distance_m)

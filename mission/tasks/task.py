@@ -8,7 +8,7 @@ import math
 from dataclasses import dataclass
 from typing import Protocol
 
-from mission.autopilot import Setpoint, VehicleState
+from mission.autopilot import FlightMode, Setpoint, VehicleState
 from mission.guidance import WorldLine
 from vision.records import LineEstimate
 
@@ -53,6 +53,7 @@ class FlightMemory:
 class Command(enum.Enum):
     """What only the autopilot's own modes can do."""
 
+    ARM = enum.auto()
     TAKEOFF = enum.auto()
     RETURN = enum.auto()
     LAND = enum.auto()
@@ -62,12 +63,14 @@ class Command(enum.Enum):
 class Step:
     """What a task wants now: a setpoint, or a command (take-off: to `altitude_m` above the take-off point).
 
-    `done` says in words why the task ended, `failed` why it cannot.
+    `next_mode` is a flight mode that the autopilot may go to by itself from now on. `done` says in words why the task
+    ended, `failed` why it cannot.
     """
 
     setpoint: Setpoint | None = None
     command: Command | None = None
     altitude_m: float = 0.0
+    next_mode: FlightMode | None = None
     done: str | None = None
     failed: str | None = None
 

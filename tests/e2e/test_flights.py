@@ -51,14 +51,12 @@ def test_dry_run_follows_the_line_and_comes_home(tmp_path: Path) -> None:
 
 
 def test_ctrl_c_while_following_leaves_the_vehicle_landed_and_a_readable_log(tmp_path: Path) -> None:
-    ran = lineflight_stopped(
-        "dry-run", ALL_TASKS, "--speed", "3", "--log", tmp_path, "--json", at="6/10 follow_lines"
-    )
+    ran = lineflight_stopped("dry-run", ALL_TASKS, "--speed", "3", "--log", tmp_path, "--json", at="6/10 follow_lines")
     assert ran.code == 130, ran.err
     assert "Traceback" not in ran.err
     assert ran.json["result"] == "interrupted"
     assert ran.json["landing"]["is_disarmed"] is True
-    assert [event["name"] for event in ran.json["events"]][0] == "interrupted"
+    assert [event["name"] for event in ran.json["events"]] == ["interrupted"]
     assert lineflight("inspect", ran.json["log"], "--json").json["result"] == "interrupted"
 
 
@@ -68,8 +66,8 @@ def test_run_flies_the_simulated_vehicle_of_another_process_and_sigterm_lands_it
     vehicle = subprocess.Popen(command, cwd=ROOT, stderr=subprocess.PIPE, text=True)
     try:
         ran = lineflight_stopped(
-            "run", ALL_TASKS, "--connection", f"udpin://127.0.0.1:{port}", "--camera", "sim:", "--log", tmp_path, "--json",
-            at="2/10 ascend", with_signal=signal.SIGTERM,
+            "run", ALL_TASKS, "--connection", f"udpin://127.0.0.1:{port}", "--camera", "sim:",
+            "--log", tmp_path, "--json", at="2/10 ascend", with_signal=signal.SIGTERM,
         )  # fmt: skip
     finally:
         os.kill(vehicle.pid, signal.SIGINT)

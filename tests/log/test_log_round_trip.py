@@ -20,9 +20,10 @@ from mission.autopilot import Setpoint, VehicleState
 from mission.log import channels
 from mission.log.backlog import Backlog
 from mission.log.disk import log_path
+from mission.log.errors import LogError
 from mission.log.reader import Flight, read_flight
 from mission.log.recorder import Recorder
-from mission.log.records import LogError, SentSetpoint, StatusText
+from mission.log.records import SentSetpoint, StatusText
 from mission.records import Event, MissionEnded, Severity, TaskEnded, TaskStarted, TruePose
 from mission.safety import Hazard, Reaction
 from tests.log import synthetic_flight

@@ -17,8 +17,8 @@ BAD_MISSIONS = {
     "align first": (b"version: 1\nname: x\ntasks:\n  - {task: align}\n  - {task: land}\n", ":4: tasks[0].task"),
     "no land": (b"version: 1\nname: x\ntasks:\n  - {task: takeoff}\n", "allowed: land or return as the last task"),
     "negative": (
-        b"version: 1\nname: x\ntasks:\n  - {task: takeoff}\n  - {task: follow_lines, distance_m: -1}\n  - {task: land}\n",
-        ":5: tasks[1].distance_m: found -1",
+        b"version: 1\nname: x\ntasks:\n  - {task: takeoff}\n  - {task: hold, duration_s: -1}\n  - {task: land}\n",
+        ":5: tasks[1].duration_s: found -1",
     ),
     "not YAML": (b"tasks: [\n", "not valid YAML"),
     "empty": (b"", "empty"),

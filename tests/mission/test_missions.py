@@ -1,16 +1,32 @@
 """Whole missions in virtual time, against the simulated vehicle."""
 
+import asyncio
 import itertools
 import math
+from collections.abc import Callable
 
 import pytest
 
 from mission.autopilot import LandedState, Setpoint, VehicleState
-from mission.plan import MissionPlan
+from mission.build import pinhole_intrinsics
+from mission.executive import Executive
+from mission.plan import MissionPlan, VehiclePlan
 from mission.records import Result, TaskEnded, TaskStarted
 from mission.tasks.task import Observation, Step
 from sitl.modes import Mode
-from tests.support.flights import ALL_TASKS_PLAN, LINE_HEADING_RAD, LINE_POINT_NED_M, Cockpit, Flown, fly, shipped
+from tests.support.flights import (
+    ALL_TASKS_PLAN,
+    LINE_HEADING_RAD,
+    LINE_POINT_NED_M,
+    Cockpit,
+    Flown,
+    KeptLog,
+    fly,
+    shipped,
+)
+from tests.support.geometric_eyes import GeometricEyes
+from tests.support.in_process import InProcessAutopilot
+from tests.support.virtual_time import VirtualClock, run_virtually
 
 TASKS = [task.task for task in ALL_TASKS_PLAN.tasks]
 
@@ -139,7 +155,7 @@ def test_ctrl_c_with_reaction_land_lands_in_place() -> None:
 def test_ctrl_c_twice_does_not_end_the_way_down() -> None:
     def twice(cockpit: Cockpit) -> None:
         cockpit.executive.request_stop()
-        cockpit.executive.request_stop()
+        asyncio.get_running_loop().call_later(10.0, cockpit.executive.request_stop)
 
     flown = fly(ALL_TASKS_PLAN, in_task="align", do=twice)
     assert flown.ended.result is Result.INTERRUPTED
@@ -147,20 +163,141 @@ def test_ctrl_c_twice_does_not_end_the_way_down() -> None:
 
 
 @pytest.mark.parametrize("mode", [Mode.LOITER, Mode.RTL, Mode.LAND])
-@pytest.mark.parametrize("task", [task for task in TASKS if task not in ("takeoff", "return")])
+@pytest.mark.parametrize("task", [task for task in TASKS if task != "return"])
 def test_takeover_in_each_task_is_never_fought(task: str, mode: Mode) -> None:
-    commands_at_takeover: list[int] = []
+    at_takeover: list[Cockpit] = []
+    commands: list[str] = []
 
     def take_over(cockpit: Cockpit) -> None:
         cockpit.autopilot.catch_up()
         cockpit.autopilot.sim.set_mode(mode)
-        commands_at_takeover.append(len(cockpit.autopilot.commands))
+        at_takeover.append(cockpit)
+        commands.extend(cockpit.autopilot.commands)
 
-    flown = fly(ALL_TASKS_PLAN, in_task=task, do=take_over)
+    flown = fly(ALL_TASKS_PLAN, in_task=task, after_s=6.0 if task == "takeoff" else 0.5, do=take_over)
     assert flown.ended.result is Result.TAKEN_OVER, flown.story
     assert "takeover" in flown.ended.reason
-    assert len(flown.autopilot.commands) == commands_at_takeover[0]
-    assert flown.autopilot.sim.is_armed or flown.autopilot.sim.mode is not Mode.OFFBOARD
+    assert flown.autopilot.commands == commands
+    assert flown.autopilot.sim.mode is mode
+
+
+def test_after_a_takeover_setpoints_stop_for_good() -> None:
+    counts: list[int] = []
+
+    def take_over(cockpit: Cockpit) -> None:
+        cockpit.autopilot.catch_up()
+        cockpit.autopilot.sim.set_mode(Mode.LOITER)
+        counts.append(cockpit.autopilot.n_setpoints)
+
+    flown = fly(ALL_TASKS_PLAN, in_task="follow_lines", after_s=5.0, do=take_over)
+    # The heartbeat tells the mode once a second: until then we cannot know.
+    assert flown.autopilot.n_setpoints - counts[0] <= 21
+
+
+def test_a_takeover_on_the_way_down_is_not_fought() -> None:
+    def stop_then_take_over(cockpit: Cockpit) -> None:
+        cockpit.executive.request_stop()
+        asyncio.get_running_loop().call_later(8.0, lambda: cockpit.autopilot.sim.set_mode(Mode.LOITER))
+
+    flown = fly(ALL_TASKS_PLAN, in_task="follow_lines", do=stop_then_take_over)
+    assert flown.ended.result is Result.TAKEN_OVER, flown.story
+    assert flown.autopilot.commands[-2:] == ["hold", "return"]
+
+
+def test_a_kill_in_mid_air_ends_our_control() -> None:
+    def kill(cockpit: Cockpit) -> None:
+        cockpit.autopilot.catch_up()
+        cockpit.autopilot.sim.disarm(is_forced=True)
+
+    flown = fly(ALL_TASKS_PLAN, in_task="follow_lines", do=kill)
+    assert "! disarmed -> give_up_control" in flown.story
+    assert flown.autopilot.commands[-1] == "offboard"
+
+
+@pytest.mark.parametrize("fault", ["refused", "lost"])
+@pytest.mark.parametrize("command", ["return", "hold"])
+def test_the_way_down_survives_refused_and_unanswered_commands(command: str, fault: str) -> None:
+    def stop(cockpit: Cockpit) -> None:
+        cockpit.autopilot.faults[command] = [fault, fault]
+        cockpit.executive.request_stop()
+
+    flown = fly(ALL_TASKS_PLAN, in_task="follow_lines", do=stop)
+    assert flown.ended.result is Result.INTERRUPTED, flown.story
+    assert not flown.autopilot.sim.is_armed
+
+
+@pytest.mark.parametrize("fault", ["refused", "lost"])
+def test_the_last_landing_is_commanded_again(fault: str) -> None:
+    def spoil(cockpit: Cockpit) -> None:
+        cockpit.autopilot.faults["return"] = [fault]
+
+    flown = fly(ALL_TASKS_PLAN, in_task="descend", do=spoil)
+    assert flown.ended.result is Result.COMPLETED, flown.story
+    assert not flown.autopilot.sim.is_armed
+
+
+def test_a_refused_offboard_brings_the_vehicle_down() -> None:
+    def spoil(cockpit: Cockpit) -> None:
+        cockpit.autopilot.faults["offboard"] = ["refused"]
+
+    flown = fly(ALL_TASKS_PLAN, in_task="takeoff", do=spoil)
+    assert flown.ended.result is Result.FAILED
+    assert "! command_refused -> land" in flown.story
+    assert not flown.autopilot.sim.is_armed
+
+
+def test_offboard_that_was_accepted_and_never_came_leaves_the_vehicle_in_its_own_mode() -> None:
+    def spoil(cockpit: Cockpit) -> None:
+        cockpit.autopilot.faults["offboard"] = ["ignored"]
+
+    flown = fly(ALL_TASKS_PLAN, in_task="takeoff", do=spoil)
+    assert flown.ended.result is Result.TAKEN_OVER
+    assert "in hold mode" in flown.ended.reason
+    assert flown.autopilot.sim.mode is Mode.LOITER
+
+
+def fly_with(spoil: Callable[[InProcessAutopilot], None]) -> tuple[Executive, InProcessAutopilot, Result]:
+    """A flight whose vehicle is spoilt before it begins."""
+
+    async def flight() -> tuple[Executive, InProcessAutopilot, Result]:
+        clock = VirtualClock()
+        autopilot = InProcessAutopilot(clock)
+        spoil(autopilot)
+        camera = pinhole_intrinsics(ALL_TASKS_PLAN.camera)
+        eyes = GeometricEyes(autopilot, clock, camera, LINE_POINT_NED_M, LINE_HEADING_RAD)
+        # The autopilot disarms a vehicle that does not take off after ten seconds; we give up before.
+        plan = ALL_TASKS_PLAN.model_copy(update={"vehicle": VehiclePlan(ready_time_limit_s=9.0)})
+        executive = Executive(plan, autopilot, eyes, KeptLog(lambda _: None), clock, camera)
+        ended = await executive.run()
+        return executive, autopilot, ended.result
+
+    return run_virtually(flight())
+
+
+def test_a_refused_arming_ends_the_mission_before_it_began() -> None:
+    executive, autopilot, result = fly_with(lambda autopilot: autopilot.faults.update(arm=["refused"]))
+    assert result is Result.FAILED
+    assert not executive.may_have_armed
+    assert autopilot.commands == ["arm"]
+
+
+def test_an_arming_without_an_answer_is_brought_down() -> None:
+    executive, autopilot, result = fly_with(lambda autopilot: autopilot.faults.update(arm=["lost"]))
+    assert result is Result.FAILED
+    assert executive.may_have_armed
+    assert not autopilot.sim.is_armed
+    assert "takeoff" not in autopilot.commands
+
+
+def test_a_vehicle_that_is_armed_already_is_left_to_whoever_armed_it() -> None:
+    def arm_by_hand(autopilot: InProcessAutopilot) -> None:
+        loop = asyncio.get_running_loop()
+        loop.call_later(4.5, lambda: (autopilot.catch_up(), autopilot.sim.arm()))
+
+    executive, autopilot, result = fly_with(arm_by_hand)
+    assert result is Result.FAILED
+    assert not executive.may_have_armed
+    assert autopilot.commands == []
 
 
 @pytest.mark.parametrize("task", ["align", "follow_lines"])
@@ -261,15 +398,6 @@ def test_a_bug_in_a_task_brings_the_vehicle_down() -> None:
 
 
 def test_before_arming_ctrl_c_ends_at_once() -> None:
-    import asyncio
-
-    from mission.build import pinhole_intrinsics
-    from mission.executive import Executive
-    from tests.support.flights import KeptLog
-    from tests.support.geometric_eyes import GeometricEyes
-    from tests.support.in_process import InProcessAutopilot
-    from tests.support.virtual_time import VirtualClock, run_virtually
-
     async def flight() -> tuple[Result, list[str]]:
         clock = VirtualClock()
         autopilot = InProcessAutopilot(clock)
@@ -281,3 +409,42 @@ def test_before_arming_ctrl_c_ends_at_once() -> None:
         return ended.result, autopilot.commands
 
     assert run_virtually(flight()) == (Result.INTERRUPTED, [])
+
+
+def test_ctrl_c_while_connecting_does_not_wait_for_the_vehicle() -> None:
+    async def flight() -> tuple[Result, int]:
+        clock = VirtualClock()
+        autopilot = InProcessAutopilot(clock)
+        autopilot.connect = asyncio.Event().wait  # type: ignore[method-assign,assignment]  # nobody is there
+        camera = pinhole_intrinsics(ALL_TASKS_PLAN.camera)
+        eyes = GeometricEyes(autopilot, clock, camera, LINE_POINT_NED_M, LINE_HEADING_RAD)
+        executive = Executive(ALL_TASKS_PLAN, autopilot, eyes, KeptLog(lambda _: None), clock, camera)
+        asyncio.get_running_loop().call_later(1.0, executive.request_stop)
+        ended = await executive.run()
+        return ended.result, clock.now_ns()
+
+    result, now_ns = run_virtually(flight())
+    assert result is Result.INTERRUPTED
+    assert now_ns < 2_000_000_000
+
+
+def test_ctrl_c_before_a_line_can_be_below_lands_and_after_moving_ahead_returns() -> None:
+    tasks = [
+        {"task": "takeoff"},
+        {"task": "ascend", "altitude_m": 16.0},
+        {"task": "move_forward", "distance_m": 12.0},
+        {"task": "hold", "duration_s": 20.0},
+        {"task": "return"},
+    ]
+    plan = MissionPlan.model_validate({"version": 1, "name": "x", "tasks": tasks})
+    flown = fly(plan, in_task="hold", do=lambda cockpit: cockpit.executive.request_stop())
+    assert flown.autopilot.commands[-2:] == ["hold", "return"]
+
+
+def test_a_short_leash_shortens_no_leg() -> None:
+    guidance = ALL_TASKS_PLAN.guidance.model_copy(update={"leash_m": 1.0})
+    flown = fly(ALL_TASKS_PLAN.model_copy(update={"guidance": guidance}))
+    assert flown.ended.result is Result.COMPLETED, flown.story
+    states = _following_states(flown)
+    first, last = states[0], states[-1]
+    assert math.hypot(last.north_m - first.north_m, last.east_m - first.east_m) == pytest.approx(12.0, abs=1.0)

@@ -14,9 +14,10 @@ from mission.safety import (
     Hazard,
     Reaction,
     SafetyInput,
-    clear_of_the_line,
     decide,
     find_hazards,
+    keep_going_down,
+    way_down,
 )
 
 LIMITS = safety_limits(SafetyPlan())
@@ -31,6 +32,7 @@ CALM = SafetyInput(
     allowed_modes=frozenset({FlightMode.OFFBOARD}),
     distance_m=10.0,
     altitude_m=16.0,
+    was_armed=True,
     is_going_down=False,
     task_age_s=1.0,
     task_limit_s=60.0,
@@ -46,6 +48,7 @@ CALM = SafetyInput(
 # What makes each hazard stand, and nothing else.
 CAUSES = {
     Hazard.TAKEOVER: replace(CALM, state=replace(STATE, mode=FlightMode.OTHER)),
+    Hazard.DISARMED: replace(CALM, state=replace(STATE, is_armed=False)),
     Hazard.LINK_LOST: replace(CALM, state=replace(STATE, is_connected=False)),
     Hazard.TELEMETRY_STALE: replace(CALM, state=replace(STATE, t_ns=98 * S)),
     Hazard.COMMAND_REFUSED: replace(CALM, refusal="no"),
@@ -61,6 +64,7 @@ CAUSES = {
 }
 EXPECTED_REACTION = {
     Hazard.TAKEOVER: Reaction.GIVE_UP_CONTROL,
+    Hazard.DISARMED: Reaction.GIVE_UP_CONTROL,
     Hazard.LINK_LOST: Reaction.GIVE_UP_CONTROL,
     Hazard.TELEMETRY_STALE: Reaction.GIVE_UP_CONTROL,
     Hazard.COMMAND_REFUSED: Reaction.LAND_CLEAR,
@@ -78,7 +82,7 @@ EXPECTED_REACTION = {
 
 def test_a_calm_flight_has_no_hazard() -> None:
     assert find_hazards(CALM, LIMITS) == {}
-    assert decide({}, REACTIONS) is None
+    assert decide({}, REACTIONS, is_offboard=True) is None
 
 
 def test_every_hazard_is_in_the_table() -> None:
@@ -91,28 +95,34 @@ def test_each_cause_is_its_hazard_alone_with_the_default_reaction(hazard: Hazard
     found = find_hazards(CAUSES[hazard], LIMITS)
     assert list(found) == [hazard]
     assert found[hazard]
-    assert decide(found, REACTIONS) == (hazard, EXPECTED_REACTION[hazard])
+    assert decide(found, REACTIONS, is_offboard=True) == (hazard, EXPECTED_REACTION[hazard])
 
 
 @pytest.mark.parametrize(("first", "second"), list(itertools.combinations(PRIORITY, 2)))
 def test_of_two_hazards_the_more_urgent_decides(first: Hazard, second: Hazard) -> None:
-    assert decide({second: "b", first: "a"}, REACTIONS) == (first, EXPECTED_REACTION[first])
+    assert decide({second: "b", first: "a"}, REACTIONS, is_offboard=True) == (first, EXPECTED_REACTION[first])
 
 
 def test_a_takeover_outranks_everything() -> None:
     assert PRIORITY[0] is Hazard.TAKEOVER
-    assert decide(dict.fromkeys(Hazard, "x"), REACTIONS) == (Hazard.TAKEOVER, Reaction.GIVE_UP_CONTROL)
+    assert decide(dict.fromkeys(Hazard, "x"), REACTIONS, is_offboard=True) == (
+        Hazard.TAKEOVER,
+        Reaction.GIVE_UP_CONTROL,
+    )
 
 
 def test_continue_never_hides_another_hazard() -> None:
     patient = {**REACTIONS, Hazard.BATTERY_LOW: Reaction.CONTINUE}
-    assert decide({Hazard.BATTERY_LOW: "x"}, patient) is None
-    assert decide({Hazard.BATTERY_LOW: "x", Hazard.LINE_LOST: "y"}, patient) == (Hazard.LINE_LOST, Reaction.RETURN)
+    assert decide({Hazard.BATTERY_LOW: "x"}, patient, is_offboard=True) is None
+    assert decide({Hazard.BATTERY_LOW: "x", Hazard.LINE_LOST: "y"}, patient, is_offboard=True) == (
+        Hazard.LINE_LOST,
+        Reaction.RETURN,
+    )
 
 
 def test_no_mission_can_change_what_happens_at_a_takeover() -> None:
     hostile = dict.fromkeys(Hazard, Reaction.CONTINUE)
-    assert decide({Hazard.TAKEOVER: "x"}, hostile) == (Hazard.TAKEOVER, Reaction.GIVE_UP_CONTROL)
+    assert decide({Hazard.TAKEOVER: "x"}, hostile, is_offboard=True) == (Hazard.TAKEOVER, Reaction.GIVE_UP_CONTROL)
 
 
 @pytest.mark.parametrize(
@@ -122,6 +132,8 @@ def test_no_mission_can_change_what_happens_at_a_takeover() -> None:
         replace(CALM, needs_vision=False, vision_failure="gone"),
         replace(CALM, is_going_down=True, altitude_m=80.0, distance_m=500.0),
         replace(CALM, state=replace(STATE, battery=None)),
+        replace(CALM, was_armed=False, state=replace(STATE, is_armed=False)),
+        replace(CALM, is_going_down=True, state=replace(STATE, is_armed=False)),
     ],
 )
 def test_what_does_not_matter_to_the_task_is_no_hazard(quiet: SafetyInput) -> None:
@@ -135,8 +147,18 @@ def test_height_is_part_of_the_fence() -> None:
 @pytest.mark.parametrize("reaction", list(Reaction))
 @pytest.mark.parametrize("may_be_over_line", [False, True])
 def test_we_never_land_on_the_line_unless_told_to(reaction: Reaction, may_be_over_line: bool) -> None:
-    resolved = clear_of_the_line(reaction, may_be_over_line=may_be_over_line)
+    resolved = way_down(reaction, may_be_over_line=may_be_over_line)
     if reaction is Reaction.LAND_CLEAR:
         assert resolved is (Reaction.RETURN if may_be_over_line else Reaction.LAND)
     else:
         assert resolved is reaction
+
+
+@pytest.mark.parametrize("hazard", [Hazard.LINK_LOST, Hazard.TELEMETRY_STALE])
+def test_outside_offboard_silence_does_not_help(hazard: Hazard) -> None:
+    assert decide({hazard: "x"}, REACTIONS, is_offboard=False) == (hazard, Reaction.LAND_CLEAR)
+
+
+def test_on_the_way_down_only_a_takeover_and_a_way_that_fails_matter() -> None:
+    kept = keep_going_down(dict.fromkeys(Hazard, "x"))
+    assert set(kept) == {Hazard.TAKEOVER, Hazard.INTERNAL_ERROR, Hazard.TASK_TIMED_OUT}

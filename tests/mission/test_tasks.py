@@ -182,12 +182,11 @@ def test_a_passing_vehicle_has_not_arrived() -> None:
 def test_takeoff_commands_once_waits_for_the_autopilot_and_goes_over_the_start() -> None:
     task = build_task(Takeoff(task="takeoff", altitude_m=5.0), GUIDANCE, memory())
     ground = state_at(START, mode=FlightMode.HOLD, is_armed=False, landed=LandedState.ON_GROUND)
-    climbing = state_at(
-        Setpoint(0.8, 0.0, -3.0, 0.0), mode=FlightMode.TAKEOFF, landed=LandedState.TAKING_OFF
-    )
+    climbing = state_at(Setpoint(0.8, 0.0, -3.0, 0.0), mode=FlightMode.TAKEOFF, landed=LandedState.TAKING_OFF)
     up = state_at(Setpoint(0.8, 0.0, -4.6, 0.0), mode=FlightMode.HOLD)
-    first = task.step(START, Observation(0.05, ground, None))
-    assert (first.command, first.altitude_m) == (Command.TAKEOFF, 5.0)
+    assert task.step(START, Observation(0.05, ground, None)).command is Command.ARM
+    second = task.step(START, Observation(0.05, ground, None))
+    assert (second.command, second.altitude_m) == (Command.TAKEOFF, 5.0)
     for state in (ground, climbing):
         assert task.step(START, Observation(0.05, state, None)) == Step()
     beside = Setpoint(0.8, 0.0, -4.6, 0.0)
@@ -199,11 +198,13 @@ def test_takeoff_commands_once_waits_for_the_autopilot_and_goes_over_the_start()
     assert (end.north_m, end.down_m) == (0.0, -5.0)
 
 
-def test_takeoff_fails_when_the_vehicle_disarms() -> None:
-    task = build_task(Takeoff(task="takeoff"), GUIDANCE, memory())
-    task.step(START, Observation(0.05, state_at(START), None))
-    task.step(START, Observation(0.05, state_at(START, mode=FlightMode.TAKEOFF), None))
-    assert task.step(START, Observation(0.05, state_at(START, is_armed=False), None)).failed
+def test_takeoff_explains_hold_only_near_its_height() -> None:
+    task = build_task(Takeoff(task="takeoff", altitude_m=5.0), GUIDANCE, memory())
+    for _ in range(2):
+        task.step(START, Observation(0.05, state_at(START), None))
+    heights = {height_m: state_at(Setpoint(0.0, 0.0, -height_m, 0.0), mode=FlightMode.TAKEOFF) for height_m in (3.7, 3.9)}
+    seen = {height_m: task.step(START, Observation(0.05, state, None)).next_mode for height_m, state in heights.items()}
+    assert seen == {3.7: None, 3.9: FlightMode.HOLD}
 
 
 def test_land_is_done_when_disarmed_on_the_ground_and_telemetry_has_had_time() -> None:
@@ -211,12 +212,22 @@ def test_land_is_done_when_disarmed_on_the_ground_and_telemetry_has_had_time() -
     down = state_at(START, is_armed=False, landed=LandedState.ON_GROUND)
     assert task.step(START, Observation(0.05, down, None)).command is Command.LAND
     assert task.step(START, Observation(1.0, down, None)) == Step()  # what it said before the command
-    assert task.step(START, Observation(3.0, state_at(START), None)) == Step()
+    landing = state_at(START, mode=FlightMode.LAND, landed=LandedState.LANDING)
+    assert task.step(START, Observation(3.0, landing, None)) == Step()
     assert task.step(START, Observation(0.05, down, None)).done
 
 
 def test_guidance_settings_keep_the_thesis_names() -> None:
-    settings: GuidanceSettings = guidance_settings(GuidancePlan(r_m_s=1.5, P_per_s=0.5, epsilon_deg=4.0, theta_0_deg=90.0))
+    settings: GuidanceSettings = guidance_settings(
+        GuidancePlan(r_m_s=1.5, P_per_s=0.5, epsilon_deg=4.0, theta_0_deg=90.0)
+    )
     assert (settings.r_m_s, settings.P_per_s) == (1.5, 0.5)
     assert settings.epsilon_rad == pytest.approx(math.radians(4.0))
     assert settings.theta_0_rad == pytest.approx(math.pi / 2)
+
+
+def test_land_is_commanded_again_when_the_autopilot_is_not_on_that_way() -> None:
+    task = build_task(Land(task="land"), GUIDANCE, memory())
+    hovering = state_at(UP, mode=FlightMode.HOLD)
+    commands = [task.step(UP, Observation(1.0, hovering, None)).command for _ in range(7)]
+    assert commands == [Command.LAND, None, None, Command.LAND, None, None, Command.LAND]

@@ -4,9 +4,10 @@ It shows what MAVLink would: mode and armed state are told once a second, as PX4
 """
 
 import math
+from collections.abc import Callable
 
 from drivers.clock import Clock
-from mission.autopilot import AutopilotError, FlightMode, LandedState, Setpoint, VehicleState
+from mission.autopilot import AutopilotError, FlightMode, LandedState, NoAnswerError, Setpoint, VehicleState
 from sitl.autopilot import SimAutopilot
 from sitl.modes import Answer, Landed, Mode
 from sitl.vehicle import Vehicle, euler_of
@@ -38,15 +39,29 @@ class InProcessAutopilot:
         self._heartbeat_s = 0.0
         self.is_connected = True
         self.commands: list[str] = []
+        self.n_setpoints = 0
+        self._setpoint: tuple[float, float, float, float] | None = None
+        self._was_offboard = False
+        self.faults: dict[str, list[str]] = {}
+        """What goes wrong with the next calls of a command: refused, lost (obeyed, unanswered), ignored (answered)."""
 
     def catch_up(self) -> None:
         """Step the vehicle to now."""
         now_s = self._clock.now_ns() / 1e9
         while self.sim.boot_s + _STEP_S <= now_s:
             self.sim.step(_STEP_S)
+            self._repeat_setpoint()
             if self.sim.boot_s - self._heartbeat_s >= 1.0:
                 self._heartbeat_s += 1.0
                 self._heartbeat = (self.sim.mode, self.sim.is_armed)
+
+    def _repeat_setpoint(self) -> None:
+        """MAVSDK's own thread repeats the last setpoint, until a heartbeat says that the mode is another."""
+        if self._heartbeat[0] is not Mode.OFFBOARD and self._was_offboard:
+            self._setpoint = None
+        self._was_offboard = self._heartbeat[0] is Mode.OFFBOARD
+        if self._setpoint is not None:
+            self.sim.set_position_setpoint(*self._setpoint)
 
     @property
     def state(self) -> VehicleState | None:
@@ -92,7 +107,9 @@ class InProcessAutopilot:
 
     async def set_setpoint(self, setpoint: Setpoint) -> None:
         self.catch_up()
-        self.sim.set_position_setpoint(setpoint.north_m, setpoint.east_m, setpoint.down_m, setpoint.yaw_rad)
+        self.n_setpoints += 1
+        self._setpoint = (setpoint.north_m, setpoint.east_m, setpoint.down_m, setpoint.yaw_rad)
+        self.sim.set_position_setpoint(*self._setpoint)
 
     async def hold(self) -> None:
         self._command("hold", lambda: self.sim.set_mode(Mode.LOITER))
@@ -104,12 +121,20 @@ class InProcessAutopilot:
         self._command("land", self.sim.land)
 
     async def close(self) -> None:
-        self.commands.append("close")
+        self._setpoint = None
 
-    def _command(self, name: str, act: "object") -> None:
+    def _command(self, name: str, act: Callable[[], Answer]) -> None:
         self.catch_up()
         self.commands.append(name)
-        answer = act()  # type: ignore[operator]
+        faults = self.faults.get(name, [])
+        fault = faults.pop(0) if faults else None
+        if fault == "refused":
+            raise AutopilotError(f"the autopilot refused to {name}: denied")
+        if fault == "ignored":
+            return
+        answer = act()
+        if fault == "lost":
+            raise NoAnswerError(f"the autopilot did not answer when asked to {name}")
         if answer is not Answer.ACCEPTED:
             raise AutopilotError(f"the autopilot refused to {name}: {answer.name.lower()}")
 
