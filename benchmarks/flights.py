@@ -53,21 +53,27 @@ def fly(seed: int, wind_m_s: float, speed: float, log: Path) -> dict[str, Any]:
     return report
 
 
+def shown(value: float | None, decimals: int) -> str:
+    """A figure for the table; a dash for a flight that has none."""
+    return "-" if value is None else f"{value:.{decimals}f}"
+
+
 def row(seed: int, wind_m_s: float, report: dict[str, Any]) -> str:
     """A line of the table."""
-    lateral, yaw, vision = report["lateral"] or {}, report["yaw_error"] or {}, report["vision"]["latency_ms"] or {}
+    lateral, yaw, landing = (report[key] or {} for key in ("lateral", "yaw_error", "landing"))
+    latency_ms, setpoints = report["vision"]["latency_ms"] or {}, report["setpoints"]
     cells = (
         f"{wind_m_s:g}",
         str(seed),
         report["result"],
-        " / ".join(f"{leg['avg_error_m']:.2f}" for leg in report["legs"]),
-        f"{lateral.get('mean_m', float('nan')):.2f} / {lateral.get('p95_m', float('nan')):.2f}",
-        f"{yaw.get('median_deg', float('nan')):.1f}",
-        f"{report['setpoints']['rate_hz']:.1f}",
-        f"{report['setpoints']['max_gap_ms']:.0f}",
-        f"{vision.get('p50', float('nan')):.0f} / {vision.get('p95', float('nan')):.0f}",
-        f"{(report['landing'] or {}).get('distance_m', float('nan')):.2f}",
-        f"{report['achieved_speed']:.2f}",
+        " / ".join(shown(leg["avg_error_m"], 2) for leg in report["legs"]),
+        f"{shown(lateral.get('mean_m'), 2)} / {shown(lateral.get('p95_m'), 2)}",
+        shown(yaw.get("median_deg"), 1),
+        shown(setpoints["rate_hz"], 1),
+        shown(setpoints["max_gap_ms"], 0),
+        f"{shown(latency_ms.get('p50'), 0)} / {shown(latency_ms.get('p95'), 0)}",
+        shown(landing.get("distance_m"), 2),
+        shown(report["achieved_speed"], 2),
     )
     return "| " + " | ".join(cells) + " |"
 
@@ -78,8 +84,8 @@ def summary(flights: list[tuple[float, dict[str, Any]]]) -> str:
     for wind_m_s in sorted({wind for wind, _ in flights}):
         reports = [report for wind, report in flights if wind == wind_m_s]
         n_completed = sum(report["result"] == "completed" for report in reports)
-        legs_m = [leg["avg_error_m"] for report in reports for leg in report["legs"]]
-        yaws_deg = [report["yaw_error"]["median_deg"] for report in reports if report["yaw_error"]]
+        legs_m = [leg["avg_error_m"] for report in reports for leg in report["legs"]] or [float("nan")]
+        yaws_deg = [report["yaw_error"]["median_deg"] for report in reports if report["yaw_error"]] or [float("nan")]
         lines.append(
             f"- wind {wind_m_s:g} m/s: {n_completed} of {len(reports)} completed; straightness of a leg "
             f"{statistics.mean(legs_m):.2f} m in the mean, {max(legs_m):.2f} m at worst; "
@@ -106,10 +112,10 @@ def main() -> None:
                 flights.append((wind_m_s, report))
                 rows.append(row(seed, wind_m_s, report))
                 print(f"{rows[-1]}  {time.monotonic() - begin_s:.0f} s wall", flush=True)
-    table = ["| " + " | ".join(COLUMNS) + " |", "|" + " --- |" * len(COLUMNS), *rows]
-    text = "\n".join([HEADER.format(speed=options.speed), summary(flights), "", *table, ""])
-    options.out.parent.mkdir(parents=True, exist_ok=True)
-    options.out.write_text(text, encoding="utf-8")
+                table = ["| " + " | ".join(COLUMNS) + " |", "|" + " --- |" * len(COLUMNS), *rows]
+                text = "\n".join([HEADER.format(speed=options.speed), summary(flights), "", *table, ""])
+                options.out.parent.mkdir(parents=True, exist_ok=True)
+                options.out.write_text(text, encoding="utf-8")
     print(summary(flights))
 
 

@@ -1,6 +1,6 @@
 """Press Ctrl-C in each task of a real dry-run, and say how each flight ended.
 
-    python benchmarks/interrupts.py [--speed K]
+python benchmarks/interrupts.py [--speed K]
 """
 
 import argparse

@@ -122,6 +122,7 @@ def detect_all(source: Path, *, as_json: bool, draw_to: Path | None) -> int:
     `draw_to` is a file for a single image, else a folder, which is made. Raises DetectError.
     """
     finder = LineFinder(VisionSettings())
+    finder.warm_up()
     is_single = source.is_file() and source.suffix.lower() not in VIDEO_SUFFIXES
     n_unreadable = 0
     for picture in read_pictures(source):

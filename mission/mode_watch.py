@@ -6,8 +6,8 @@ from mission.autopilot import FlightMode, LandedState, VehicleState
 GRACE_S = 2.5
 """How long after a command the mode before it still explains itself: PX4's heartbeat tells its mode once a second.
 
-After it, a mode that did not change is as little ours as one that did: an autopilot that said yes and stayed, and a pilot
-who was quicker than the heartbeat, look the same from here, and the pilot is never fought.
+After it, a mode that did not change is as little ours as one that did: an autopilot that said yes and stayed, and a
+pilot who was quicker than the heartbeat, look the same from here, and the pilot is never fought.
 """
 
 _ANY = frozenset(FlightMode)

@@ -58,6 +58,7 @@ class SimAutopilot:
         self._land_detector = LandDetector(self._hover_thrust)
         self._position_control = PositionControl(self.parameters, self._hover_thrust)
         self._attitude_control = AttitudeControl(self.parameters)
+        self._air_m_s: Vector = (0.0, 0.0, 0.0)
         self._was_landing = False
         self._was_armed = False
         self._ramp = TakeoffRamp(self.parameters)
@@ -67,6 +68,7 @@ class SimAutopilot:
         self._setpoint_s: float | None = None
         self._has_taken_off = False
         self._takeoff_requests = 0
+        self._takeoff_altitude_m: float | None = None
 
     # --- what a ground station or an application asks ---
 
@@ -116,9 +118,10 @@ class SimAutopilot:
         """Disarm the motors; in the air only when forced."""
         return self.commander.disarm(is_forced=is_forced)
 
-    def takeoff(self) -> Answer:
-        """Take off to MIS_TAKEOFF_ALT over home; disarmed it waits for arming."""
+    def takeoff(self, altitude_m: float | None = None) -> Answer:
+        """Take off to `altitude_m` AMSL, or to MIS_TAKEOFF_ALT over home; disarmed it waits for arming."""
         self._takeoff_requests += 1
+        self._takeoff_altitude_m = altitude_m
         return self.commander.request(Mode.TAKEOFF)
 
     def land(self) -> Answer:
@@ -134,14 +137,19 @@ class SimAutopilot:
         return self.commander.request(mode)
 
     def set_position_setpoint(self, north_m: float, east_m: float, down_m: float, yaw_rad: float) -> None:
-        """Take an offboard setpoint: local NED [m], yaw [rad] (SET_POSITION_TARGET_LOCAL_NED). NaN keeps what is."""
+        """Take an offboard setpoint: local NED [m], yaw [rad] (SET_POSITION_TARGET_LOCAL_NED).
+
+        What is not finite keeps what is: the position where the vehicle is, the yaw that was last asked for offboard.
+        """
         n, e, d = self.estimate.position_m
         target = tuple(
-            actual if math.isnan(wanted) else wanted
+            wanted if math.isfinite(wanted) else actual
             for wanted, actual in zip((north_m, east_m, down_m), (n, e, d), strict=True)
         )
-        yaw = euler_of(self.estimate.quaternion)[2] if math.isnan(yaw_rad) else yaw_rad
-        self._offboard_target = ((target[0], target[1], target[2]), yaw)
+        if not math.isfinite(yaw_rad):
+            asked = self._offboard_target if isinstance(self._task, Offboard) else None
+            yaw_rad = asked[1] if asked is not None else euler_of(self.estimate.quaternion)[2]
+        self._offboard_target = ((target[0], target[1], target[2]), yaw_rad)
         self._setpoint_s = self.boot_s
         # PX4's commander sees a fresh stream at once: MAVSDK sends a setpoint and the mode change in one go.
         self.commander.see_setpoint()
@@ -149,7 +157,7 @@ class SimAutopilot:
             self._task.aim(*self._offboard_target)
 
     def set_parameter(self, name: str, value: float | int) -> None:
-        """Write a parameter; raises KeyError and TypeError as Parameters.set does."""
+        """Write a parameter; raises KeyError, TypeError and ValueError as Parameters.set does."""
         self.parameters.set(name, value)
         self._position_control.tune(self.parameters)
         self._attitude_control.tune(self.parameters)
@@ -181,8 +189,9 @@ class SimAutopilot:
         )
         thrust, torque = self._control(dt_s)
         self.thrust = thrust
-        air_m_s = self.wind.step(dt_s, vehicle.height_m, math.dist(vehicle.velocity_m_s, (0.0, 0.0, 0.0)))
-        vehicle.step(dt_s, thrust, torque, air_m_s)
+        airspeed_m_s = math.dist(vehicle.velocity_m_s, self._air_m_s)
+        self._air_m_s = self.wind.step(dt_s, vehicle.height_m, airspeed_m_s)
+        vehicle.step(dt_s, thrust, torque, self._air_m_s)
         self.battery.step(dt_s, vehicle.power_w)
         self.estimate = self._estimator.step(dt_s, vehicle)
         self._detect_landing(dt_s)
@@ -227,17 +236,14 @@ class SimAutopilot:
         if mode is Mode.OFFBOARD and self._offboard_target is not None:
             return Offboard(self.parameters, *self._offboard_target)
         if mode is Mode.TAKEOFF:
-            altitude_m = self.parameters.get("MIS_TAKEOFF_ALT")
-            self.say(Severity.INFO, f"Using default takeoff altitude: {altitude_m:.1f} m", delay_s=_NAVIGATOR_S)
-            down_m = self.home.position_m[2] - altitude_m if self.home else -altitude_m
-            return Takeoff(self.parameters, self.estimate, min(down_m, self.estimate.position_m[2]))
+            return Takeoff(self.parameters, self.estimate, min(self._takeoff_down_m(), self.estimate.position_m[2]))
         if mode is Mode.RTL and self.home is not None:
-            task = Return(self.parameters, self.estimate, self.home.position_m)
+            task = Return(self.parameters, self.estimate, self.home.position_m, self.home.yaw_rad)
             home_altitude_m = self.origin.global_of(self.home.position_m)[2]
             self.say(
                 Severity.INFO,
-                f"RTL: start return at {home_altitude_m + task.return_height_m:.0f} m "
-                f"({task.return_height_m:.0f} m above destination)",
+                f"RTL: start return at {math.ceil(home_altitude_m + task.return_height_m)} m "
+                f"({math.ceil(task.return_height_m)} m above destination)",
                 delay_s=_NAVIGATOR_S,
             )
             return task
@@ -246,6 +252,16 @@ class SimAutopilot:
         if self.commander.is_descending_without_sticks:
             return Descend(self.parameters, self.estimate)
         return Hold(self.parameters, self.estimate)
+
+    def _takeoff_down_m(self) -> float:
+        """Where a take-off ends, down [m] NED: at the altitude asked for if that is above, else at the default one."""
+        if self._takeoff_altitude_m is not None:
+            down_m = self.origin.altitude_m - self._takeoff_altitude_m
+            if down_m < self.estimate.position_m[2] - self.parameters.get("NAV_MC_ALT_RAD"):
+                return down_m
+        height_m = self.parameters.get("MIS_TAKEOFF_ALT")
+        self.say(Severity.INFO, f"Using default takeoff altitude: {height_m:.1f} m", delay_s=_NAVIGATOR_S)
+        return self.home.position_m[2] - height_m if self.home else -height_m
 
     def _wants_takeoff(self) -> bool:
         """Whether the task would leave the ground: a take-off, or an offboard setpoint above."""

@@ -12,6 +12,7 @@ DO_SET_MODE = 176
 REBOOT = 246
 MISSION_START = 300
 ARM_DISARM = 400
+RUN_PREARM_CHECKS = 401
 _FORCE = 21196
 
 
@@ -22,11 +23,13 @@ def execute(autopilot: SimAutopilot, command: int, params: tuple[float, ...]) ->
             return autopilot.arm()
         return autopilot.disarm(is_forced=_is(params[1], _FORCE))
     if command == TAKEOFF:
-        return autopilot.takeoff()
+        return autopilot.takeoff(params[6] if math.isfinite(params[6]) else None)
     if command == LAND:
         return autopilot.land()
     if command == RETURN_TO_LAUNCH:
         return autopilot.set_mode(Mode.RTL)
+    if command == RUN_PREARM_CHECKS:
+        return Answer.ACCEPTED  # the model's checks run all the time
     if command == DO_SET_MODE:
         return _set_mode(autopilot, params)
     if command == MISSION_START:

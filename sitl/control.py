@@ -11,6 +11,7 @@ from sitl.parameters import Parameters
 from sitl.vehicle import GRAVITY_M_S2, Quaternion, Vector
 
 _HORIZONTAL_THRUST_MARGIN = 0.3
+_MIN_YAW_WEIGHT = 1e-4  # below it yaw has no weight at all, and its gain is not scaled up
 _YAW_TORQUE_LAG_S = 0.04  # MC_YAW_TQ_CUTOFF's low-pass: yaw is the axis that motors turn by their drag
 
 
@@ -93,7 +94,7 @@ class PositionControl:
         # Vertical thrust has priority, but a margin is left for the horizontal.
         thrust_h = math.hypot(thrust_n, thrust_e)
         thrust_h_kept = min(thrust_h, _HORIZONTAL_THRUST_MARGIN)
-        vertical_max = math.sqrt(self._thrust_max**2 - thrust_h_kept**2)
+        vertical_max = math.sqrt(max(self._thrust_max**2 - thrust_h_kept**2, 0.0))
         saturated_up = -thrust_d > vertical_max
         thrust_d = max(thrust_d, -vertical_max)
         horizontal_max = math.sqrt(max(self._thrust_max**2 - thrust_d**2, 0.0))
@@ -170,7 +171,8 @@ class AttitudeControl:
         """Take other gains, and keep the integrals."""
         get = parameters.get
         self._yaw_weight = get("MC_YAW_WEIGHT")
-        self._p_attitude = (get("MC_ROLL_P"), get("MC_PITCH_P"), get("MC_YAW_P") / self._yaw_weight)
+        yaw_scale = 1 / self._yaw_weight if self._yaw_weight > _MIN_YAW_WEIGHT else 1.0
+        self._p_attitude = (get("MC_ROLL_P"), get("MC_PITCH_P"), get("MC_YAW_P") * yaw_scale)
         self._max_rates_rad_s = tuple(math.radians(get(f"MC_{axis}RATE_MAX")) for axis in ("ROLL", "PITCH", "YAW"))
         self._p = (get("MC_ROLLRATE_P"), get("MC_PITCHRATE_P"), get("MC_YAWRATE_P"))
         self._i = (get("MC_ROLLRATE_I"), get("MC_PITCHRATE_I"), get("MC_YAWRATE_I"))
@@ -185,17 +187,17 @@ class AttitudeControl:
     def rates_setpoint_rad_s(self, wanted: Quaternion, actual: Quaternion) -> Vector:
         """Body rates FRD [rad/s] that turn `actual` to `wanted`, the thrust direction first, yaw by its weight."""
         # The error splits into a tilt that aligns body z and a yaw about it; scaling the latter slows yaw down.
-        w, x, y, z = _multiply(_conjugate(actual), wanted)
+        w, x, y, z = multiply(_conjugate(actual), wanted)
         norm = math.hypot(w, z)
         if norm < 1e-5:
             tilt, cos_half, sin_half = (w, x, y, z), 1.0, 0.0
         else:
             cos_half, sin_half = w / norm, z / norm
-            tilt = _multiply((w, x, y, z), (cos_half, 0.0, 0.0, -sin_half))
+            tilt = multiply((w, x, y, z), (cos_half, 0.0, 0.0, -sin_half))
         if cos_half < 0.0:
             cos_half, sin_half = -cos_half, -sin_half
         half_rad = self._yaw_weight * math.atan2(sin_half, cos_half)
-        ew, ex, ey, ez = _multiply(tilt, (math.cos(half_rad), 0.0, 0.0, math.sin(half_rad)))
+        ew, ex, ey, ez = multiply(tilt, (math.cos(half_rad), 0.0, 0.0, math.sin(half_rad)))
         sign = 2.0 if ew >= 0.0 else -2.0
         px, py, pz = self._p_attitude
         mx, my, mz = self._max_rates_rad_s
@@ -226,7 +228,8 @@ def _conjugate(q: Quaternion) -> Quaternion:
     return (q[0], -q[1], -q[2], -q[3])
 
 
-def _multiply(a: Quaternion, b: Quaternion) -> Quaternion:
+def multiply(a: Quaternion, b: Quaternion) -> Quaternion:
+    """The rotation `b`, then `a`: target_from_middle times middle_from_source."""
     aw, ax, ay, az = a
     bw, bx, by, bz = b
     return (

@@ -1,9 +1,9 @@
-"""What the autopilot believes about its motion: the truth plus slowly varying, GPS-like errors, the same for a seed."""
+"""What the autopilot believes about its motion: the truth plus biases and slowly varying errors, from a seed."""
 
 import math
 import random
 
-from sitl.control import Estimate, quaternion_of
+from sitl.control import Estimate, multiply, quaternion_of
 from sitl.vehicle import Quaternion, Vector, Vehicle
 
 # Standard deviation and correlation time of each error, of the size that a PX4 v1.16 with GPS shows standing and
@@ -15,6 +15,9 @@ _VELOCITY_M_S = (0.06, 0.06, 0.04)
 _VELOCITY_S = 1.5
 _ATTITUDE_RAD = math.radians(0.2)
 _ATTITUDE_S = 3.0
+# Biases that stay for a flight: how well an accelerometer is levelled on its mount, and a compass calibrated.
+_LEVEL_BIAS_RAD = math.radians(0.3)
+_COMPASS_BIAS_RAD = math.radians(1.5)
 _RATE_RAD_S = 0.01
 
 
@@ -29,6 +32,9 @@ class Estimator:
         self._position = [0.0, 0.0, 0.0]
         self._velocity = [0.0, 0.0, 0.0]
         self._attitude = [0.0, 0.0, 0.0]
+        biases = random.Random(f"estimator biases {seed}")
+        self._level_bias_rad = (biases.gauss(0.0, _LEVEL_BIAS_RAD), biases.gauss(0.0, _LEVEL_BIAS_RAD))
+        self._compass_bias = quaternion_of(0.0, 0.0, biases.gauss(0.0, _COMPASS_BIAS_RAD))
 
     def step(self, dt_s: float, vehicle: Vehicle) -> Estimate:
         """The estimate after `dt_s` [s]."""
@@ -57,20 +63,16 @@ class Estimator:
             _sum(vehicle.position_m, self._position),
             _sum(vehicle.velocity_m_s, self._velocity),
             vehicle.acceleration_m_s2,
-            self._tilted(vehicle.quaternion),
+            self._turned(vehicle.quaternion),
             (p + gauss(0.0, _RATE_RAD_S), q + gauss(0.0, _RATE_RAD_S), r + gauss(0.0, _RATE_RAD_S)),
         )
 
-    def _tilted(self, quaternion: Quaternion) -> Quaternion:
-        """The attitude, turned by the (small) attitude error."""
-        w, x, y, z = quaternion
-        bw, bx, by, bz = quaternion_of(*self._attitude)
-        return (
-            w * bw - x * bx - y * by - z * bz,
-            w * bx + x * bw + y * bz - z * by,
-            w * by - x * bz + y * bw + z * bx,
-            w * bz + x * by - y * bx + z * bw,
-        )
+    def _turned(self, quaternion: Quaternion) -> Quaternion:
+        """The attitude with its errors: the compass errs about the vertical, the level and the noise in the body."""
+        roll_rad, pitch_rad, yaw_rad = self._attitude
+        roll_bias_rad, pitch_bias_rad = self._level_bias_rad
+        in_body = quaternion_of(roll_rad + roll_bias_rad, pitch_rad + pitch_bias_rad, yaw_rad)
+        return multiply(multiply(self._compass_bias, quaternion), in_body)
 
 
 def _sum(truth: Vector, error: list[float]) -> Vector:

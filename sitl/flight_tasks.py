@@ -13,6 +13,7 @@ _MAX_LAG_M = 2.0  # MPC_XY_ERR_MAX: the reference waits for a vehicle that falls
 _APPROACH_M_S2 = 0.45  # how hard a climb or a descent brakes before its end, as recorded from PX4 v1.16
 _DESCEND_M_S = 0.6  # a failsafe descent without sticks, as recorded from PX4 v1.16
 _TAKEOFF_ACCELERATION_M_S2 = 0.5
+_YAW_RATE_RAD_S = math.radians(45.0)  # a turn that a task makes by itself
 
 
 class FlightTask(Protocol):
@@ -89,6 +90,12 @@ class _Auto:
         """Whether the vehicle is on its way to the ground."""
         return False
 
+    def _turn(self, dt_s: float, yaw_rad: float) -> None:
+        """Turn the setpoint's yaw towards `yaw_rad`, the short way."""
+        left_rad = math.remainder(yaw_rad - self._yaw_rad, 2 * math.pi)
+        step_rad = _YAW_RATE_RAD_S * dt_s
+        self._yaw_rad = math.remainder(self._yaw_rad + clamp(left_rad, -step_rad, step_rad), 2 * math.pi)
+
     def _setpoint(self) -> Setpoint:
         n, e, d = self._reference.position_m
         vn, ve, vd = self._reference.velocity_m_s
@@ -141,10 +148,17 @@ class Takeoff(_Auto):
 class Land(_Auto):
     """Descend, slower towards the ground, until disarmed: where the vehicle is, or on a spot (north, east) [m]."""
 
-    def __init__(self, parameters: Parameters, estimate: Estimate, spot_m: tuple[float, float] | None = None) -> None:
-        """Start where the vehicle is; without a spot it brakes and comes straight down."""
+    def __init__(
+        self,
+        parameters: Parameters,
+        estimate: Estimate,
+        spot_m: tuple[float, float] | None = None,
+        yaw_rad: float | None = None,
+    ) -> None:
+        """Start where the vehicle is; without a spot it brakes and comes straight down, without a yaw it keeps it."""
         super().__init__(parameters, estimate)
         self._spot_m = spot_m
+        self._final_yaw_rad = self._yaw_rad if yaw_rad is None else yaw_rad
 
     @property
     def is_landing(self) -> bool:
@@ -161,6 +175,7 @@ class Land(_Auto):
         if height_m < get("MPC_LAND_ALT3"):
             speed_m_s = get("MPC_LAND_CRWL")
             self._tilt_rad = math.radians(get("MPC_TILTMAX_LND"))
+        self._turn(dt_s, self._final_yaw_rad)
         north_m_s = east_m_s = 0.0
         if self._spot_m is not None:
             n, e, _ = self._reference.position_m
@@ -179,12 +194,13 @@ class Descend(_Auto):
 
 
 class Return(_Auto):
-    """Climb if need be, fly home, descend and land there (PX4's rtl_direct)."""
+    """Climb if need be, fly home, turn as home was, descend and land there (PX4's rtl_direct)."""
 
-    def __init__(self, parameters: Parameters, estimate: Estimate, home_m: Vector) -> None:
-        """Return to `home_m` NED [m]; `return_height_m` over it is what PX4 announces."""
+    def __init__(self, parameters: Parameters, estimate: Estimate, home_m: Vector, home_yaw_rad: float) -> None:
+        """Return to `home_m` NED [m] and its yaw [rad]; `return_height_m` over it is what PX4 announces."""
         super().__init__(parameters, estimate)
         self._home_m = home_m
+        self._home_yaw_rad = home_yaw_rad
         n, e, d = estimate.position_m
         distance_m = math.hypot(n - home_m[0], e - home_m[1])
         self.return_height_m = max(_return_height_m(parameters, distance_m), home_m[2] - d)
@@ -206,8 +222,10 @@ class Return(_Auto):
         radius_m = self._parameters.get("NAV_MC_ALT_RAD")
         self._has_climbed = self._has_climbed or climb_m < radius_m
         if self._has_climbed and distance_m < 1.0 and math.hypot(*estimate.velocity_m_s[:2]) < 1.0:
-            self._landing = Land(self._parameters, estimate, self._home_m[:2])
+            self._landing = Land(self._parameters, estimate, self._home_m[:2], self._home_yaw_rad)
             return self._landing.step(dt_s, estimate, height_m)
+        if distance_m < self._parameters.get("RTL_MIN_DIST"):
+            self._turn(dt_s, self._home_yaw_rad)
         limit_m_s = self._parameters.get("MPC_XY_CRUISE") if self._has_climbed else 0.0
         braking_m_s2 = 0.4 * self._parameters.get("MPC_ACC_HOR")
         reference_n, reference_e, _ = self._reference.position_m

@@ -15,11 +15,12 @@ from pymavlink.dialects.v20 import all as dialect
 
 from sitl import commands
 from sitl.autopilot import SimAutopilot
-from sitl.modes import Answer
+from sitl.modes import Answer, Severity
 from sitl.parameters import Parameter
 from sitl.telemetry import STREAMS, Stream
 
 _OWN_PORT_OFFSET = 40  # PX4: 14580 speaks to 14540
+_LAST_PORT = 65535
 _FIRST_BEAT_S = 0.24  # after boot; the heartbeat keeps this fraction of each second
 _COMMAND_S = 0.008  # a command waits this long for PX4's commander, in flight time
 _TEXT_CHUNK = 50
@@ -29,17 +30,37 @@ _GET_MESSAGE_INTERVAL, _SET_MESSAGE_INTERVAL, _REQUEST_MESSAGE = 510, 511, 512
 _REQUEST_CAPABILITIES = 520
 _AUTOPILOT_VERSION = 148
 _FLOAT, _INT32 = 9, 6  # MAV_PARAM_TYPE
-_IGNORE_POSITION = 0x7
+_IGNORE_POSITION, _IGNORE_YAW = 0x7, 0x400  # POSITION_TARGET_TYPEMASK
+_LOCAL_NED = 1  # MAV_FRAME
+_MAX_INTERVAL_US = 2**31 - 1  # what MESSAGE_INTERVAL can tell
+
+_COMPONENT_METADATA, _COMPONENT_METADATA_EXTRA = 397, 182
 
 Address = tuple[str, int]
+
+
+class _NoComponentMetadata(dialect.MAVLink_message):  # type: ignore[misc]
+    """COMPONENT_METADATA, which the dialect lacks, saying that there is no file (and so no checksum of it)."""
+
+    def __init__(self, time_boot_ms: int) -> None:
+        super().__init__(_COMPONENT_METADATA, "COMPONENT_METADATA")
+        self._payload_bytes = struct.pack("<II100s", time_boot_ms, 0, b"")
+
+    def pack(self, mav: Any, force_mavlink1: bool = False) -> bytes:
+        return bytes(self._pack(mav, _COMPONENT_METADATA_EXTRA, self._payload_bytes, force_mavlink1=force_mavlink1))
 
 
 class MavlinkFace:
     """One autopilot's UDP link. Use it as a context manager, or `close` it."""
 
     def __init__(self, autopilot: SimAutopilot, port: int, host: str = "127.0.0.1") -> None:
-        """Speak to `host`:`port` from port + 40; raises OSError with a sentence when that port is taken."""
+        """Speak to `host`:`port` from port + 40; raises OSError with a sentence when it cannot have that port."""
         self._autopilot = autopilot
+        if port + _OWN_PORT_OFFSET > _LAST_PORT:
+            raise OSError(
+                f"UDP port {port} leaves none for the simulated autopilot, which speaks from {_OWN_PORT_OFFSET} above; "
+                f"choose a port up to {_LAST_PORT - _OWN_PORT_OFFSET}"
+            )
         self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         self._socket.setblocking(False)
         try:
@@ -47,7 +68,7 @@ class MavlinkFace:
         except OSError as error:
             self._socket.close()
             raise OSError(
-                f"UDP port {port + _OWN_PORT_OFFSET} for the simulated autopilot is taken; "
+                f"UDP port {port + _OWN_PORT_OFFSET} for the simulated autopilot cannot be had ({error.strerror}); "
                 "end the other simulation or choose another port"
             ) from error
         # The application is spoken to unasked, other stations once they were heard.
@@ -59,6 +80,7 @@ class MavlinkFace:
         self._intervals_s = {stream.message_id: 1 / stream.rate_hz for stream in STREAMS if stream.rate_hz > 0}
         self._commands: deque[tuple[float, Any, int, tuple[float, ...]]] = deque()
         self._parameters: deque[Parameter] = deque()
+        self._has_refused_frame = False
         self._n_texts = 0
         self._n_pings = 0
         self._ping_s = autopilot.boot_s
@@ -134,8 +156,14 @@ class MavlinkFace:
         self._commands.append((self._autopilot.boot_s + _COMMAND_S, message, message.command, params))
 
     def _on_set_position_target_local_ned(self, message: Any) -> None:
-        if message.type_mask & _IGNORE_POSITION == 0:
-            self._autopilot.set_position_setpoint(message.x, message.y, message.z, message.yaw)
+        if message.coordinate_frame != _LOCAL_NED:
+            if not self._has_refused_frame:  # say it once: setpoints come many times a second
+                self._has_refused_frame = True
+                text = f"Setpoints in frame {message.coordinate_frame} are refused; send MAV_FRAME_LOCAL_NED"
+                self._autopilot.say(Severity.CRITICAL, text)
+        elif message.type_mask & _IGNORE_POSITION == 0:
+            yaw_rad = math.nan if message.type_mask & _IGNORE_YAW else message.yaw
+            self._autopilot.set_position_setpoint(message.x, message.y, message.z, yaw_rad)
 
     def _on_param_request_read(self, message: Any) -> None:
         try:
@@ -158,6 +186,8 @@ class MavlinkFace:
             self._autopilot.set_parameter(message.param_id, value)
         except (KeyError, TypeError):
             return
+        except ValueError as error:
+            self._autopilot.say(Severity.WARNING, f"Refused: {error}")  # and the old value is the answer
         self._send_parameter(self._autopilot.parameters.parameter(message.param_id))
 
     def _on_ping(self, message: Any) -> None:
@@ -180,7 +210,9 @@ class MavlinkFace:
                 return self._set_interval(message_id, params[1])
             if command == _REQUEST_MESSAGE:
                 return self._request_message(message_id)
-            interval_us = round(self._intervals_s.get(message_id, 0.0) * 1e6)
+            if message_id not in self._streams:
+                return Answer.DENIED
+            interval_us = min(round(self._intervals_s.get(message_id, 0.0) * 1e6), _MAX_INTERVAL_US)
             self._send(self._mavlink.message_interval_encode(message_id, interval_us))
             return Answer.ACCEPTED
         return commands.execute(self._autopilot, command, params)
@@ -201,6 +233,9 @@ class MavlinkFace:
         return Answer.ACCEPTED
 
     def _request_message(self, message_id: int) -> Answer:
+        if message_id == _COMPONENT_METADATA:
+            self._send(_NoComponentMetadata(round(self._autopilot.boot_s * 1e3)))
+            return Answer.ACCEPTED
         stream = self._streams.get(message_id)
         return Answer.ACCEPTED if stream is not None and self._send_stream(stream) else Answer.DENIED
 

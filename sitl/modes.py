@@ -52,7 +52,6 @@ _TITLES = {
 class Landed(enum.IntEnum):
     """MAV_LANDED_STATE."""
 
-    UNDEFINED = 0
     ON_GROUND = 1
     IN_AIR = 2
     TAKEOFF = 3
@@ -66,7 +65,6 @@ class Answer(enum.IntEnum):
     TEMPORARILY_REJECTED = 1
     DENIED = 2
     UNSUPPORTED = 3
-    FAILED = 4
 
 
 class Severity(enum.IntEnum):

@@ -1,5 +1,6 @@
 """The simulated autopilot's parameters: PX4's names, types and defaults, as a ground station reads and writes them."""
 
+import math
 from dataclasses import dataclass
 
 
@@ -17,81 +18,84 @@ class Parameter:
         return isinstance(self.value, int)
 
 
-# PX4 v1.16 defaults of the parameters that the model obeys, and of the MAV_ and SYS_ ones that say what it is. A value
-# written as an int is INT32, one written with a point is FLOAT.
-DEFAULTS: dict[str, float | int] = {
-    "BAT_CRIT_THR": 0.07,
-    "BAT_EMERGEN_THR": 0.05,
-    "BAT_LOW_THR": 0.15,
-    "COM_DISARM_LAND": 2.0,
-    "COM_DISARM_PRFLT": 10.0,
-    "COM_FAIL_ACT_T": 5.0,
-    "COM_LOW_BAT_ACT": 3,
-    "COM_OBL_RC_ACT": 0,
-    "COM_OF_LOSS_T": 1.0,
-    "COM_SPOOLUP_TIME": 1.0,
-    "MAV_COMP_ID": 1,
-    "MAV_SYS_ID": 1,
-    "MAV_TYPE": 2,
-    "MC_PITCHRATE_D": 0.003,
-    "MC_PITCHRATE_I": 0.2,
-    "MC_PITCHRATE_MAX": 220.0,
-    "MC_PITCHRATE_P": 0.15,
-    "MC_PITCH_P": 6.5,
-    "MC_ROLLRATE_D": 0.003,
-    "MC_ROLLRATE_I": 0.2,
-    "MC_ROLLRATE_MAX": 220.0,
-    "MC_ROLLRATE_P": 0.15,
-    "MC_ROLL_P": 6.5,
-    "MC_YAWRATE_I": 0.1,
-    "MC_YAWRATE_MAX": 200.0,
-    "MC_YAWRATE_P": 0.2,
-    "MC_YAW_P": 2.8,
-    "MC_YAW_WEIGHT": 0.4,
-    "MIS_TAKEOFF_ALT": 2.5,
-    "MPC_ACC_DOWN_MAX": 3.0,
-    "MPC_ACC_HOR": 3.0,
-    "MPC_ACC_UP_MAX": 4.0,
-    "MPC_JERK_AUTO": 4.0,
-    "MPC_LAND_ALT1": 10.0,
-    "MPC_LAND_ALT2": 5.0,
-    "MPC_LAND_ALT3": 1.0,
-    "MPC_LAND_CRWL": 0.3,
-    "MPC_LAND_SPEED": 0.7,
-    "MPC_THR_MAX": 1.0,
-    "MPC_THR_MIN": 0.12,
-    "MPC_TILTMAX_AIR": 45.0,
-    "MPC_TILTMAX_LND": 12.0,
-    "MPC_TKO_RAMP_T": 3.0,
-    "MPC_TKO_SPEED": 1.5,
-    "MPC_XY_CRUISE": 5.0,
-    "MPC_XY_P": 0.95,
-    "MPC_XY_VEL_D_ACC": 0.2,
-    "MPC_XY_VEL_I_ACC": 0.4,
-    "MPC_XY_VEL_MAX": 12.0,
-    "MPC_XY_VEL_P_ACC": 1.8,
-    "MPC_Z_P": 1.0,
-    "MPC_Z_VEL_D_ACC": 0.0,
-    "MPC_Z_VEL_I_ACC": 2.0,
-    "MPC_Z_VEL_MAX_DN": 1.5,
-    "MPC_Z_VEL_MAX_UP": 3.0,
-    "MPC_Z_VEL_P_ACC": 4.0,
-    "MPC_Z_V_AUTO_DN": 1.5,
-    "MPC_Z_V_AUTO_UP": 3.0,
-    "NAV_ACC_RAD": 10.0,
-    "NAV_MC_ALT_RAD": 0.8,
-    "RTL_CONE_ANG": 45,
-    "RTL_MIN_DIST": 10.0,
-    "RTL_RETURN_ALT": 60.0,
-    "SYS_AUTOSTART": 6001,
+# Default, least and greatest value of the parameters that the model obeys, and of the MAV_ and SYS_ ones that say what
+# it is. Defaults and types are PX4 v1.16's: a value written as an int is INT32, one with a point is FLOAT. The ranges
+# follow its documentation; where that has none or is narrower than missions need, they are what the model bears.
+_TABLE: dict[str, tuple[float | int, float | int, float | int]] = {
+    "BAT_CRIT_THR": (0.07, 0.0, 1.0),
+    "BAT_EMERGEN_THR": (0.05, 0.0, 1.0),
+    "BAT_LOW_THR": (0.15, 0.0, 1.0),
+    "COM_DISARM_LAND": (2.0, -1.0, 20.0),
+    "COM_DISARM_PRFLT": (10.0, -1.0, 60.0),
+    "COM_FAIL_ACT_T": (5.0, 0.0, 25.0),
+    "COM_LOW_BAT_ACT": (3, 0, 3),
+    "COM_OBL_RC_ACT": (0, 0, 7),
+    "COM_OF_LOSS_T": (1.0, 0.0, 60.0),
+    "COM_SPOOLUP_TIME": (1.0, 0.0, 30.0),
+    "MAV_COMP_ID": (1, 1, 250),
+    "MAV_SYS_ID": (1, 1, 250),
+    "MAV_TYPE": (2, 0, 43),
+    "MC_PITCHRATE_D": (0.003, 0.0, 0.01),
+    "MC_PITCHRATE_I": (0.2, 0.0, 1.0),
+    "MC_PITCHRATE_MAX": (220.0, 0.0, 1800.0),
+    "MC_PITCHRATE_P": (0.15, 0.01, 0.6),
+    "MC_PITCH_P": (6.5, 0.0, 12.0),
+    "MC_ROLLRATE_D": (0.003, 0.0, 0.01),
+    "MC_ROLLRATE_I": (0.2, 0.0, 1.0),
+    "MC_ROLLRATE_MAX": (220.0, 0.0, 1800.0),
+    "MC_ROLLRATE_P": (0.15, 0.01, 0.5),
+    "MC_ROLL_P": (6.5, 0.0, 12.0),
+    "MC_YAWRATE_I": (0.1, 0.0, 1.0),
+    "MC_YAWRATE_MAX": (200.0, 0.0, 1800.0),
+    "MC_YAWRATE_P": (0.2, 0.0, 0.6),
+    "MC_YAW_P": (2.8, 0.0, 5.0),
+    "MC_YAW_WEIGHT": (0.4, 0.0, 1.0),
+    "MIS_TAKEOFF_ALT": (2.5, 0.0, 1000.0),
+    "MPC_ACC_DOWN_MAX": (3.0, 2.0, 15.0),
+    "MPC_ACC_HOR": (3.0, 2.0, 15.0),
+    "MPC_ACC_UP_MAX": (4.0, 2.0, 15.0),
+    "MPC_JERK_AUTO": (4.0, 1.0, 80.0),
+    "MPC_LAND_ALT1": (10.0, 0.0, 122.0),
+    "MPC_LAND_ALT2": (5.0, 0.0, 122.0),
+    "MPC_LAND_ALT3": (1.0, 0.0, 122.0),
+    "MPC_LAND_CRWL": (0.3, 0.1, 5.0),
+    "MPC_LAND_SPEED": (0.7, 0.6, 5.0),
+    "MPC_THR_MAX": (1.0, 0.0, 1.0),
+    "MPC_THR_MIN": (0.12, 0.05, 0.5),
+    "MPC_TILTMAX_AIR": (45.0, 20.0, 89.0),
+    "MPC_TILTMAX_LND": (12.0, 10.0, 89.0),
+    "MPC_TKO_RAMP_T": (3.0, 0.0, 5.0),
+    "MPC_TKO_SPEED": (1.5, 1.0, 5.0),
+    "MPC_XY_CRUISE": (5.0, 3.0, 20.0),
+    "MPC_XY_P": (0.95, 0.0, 2.0),
+    "MPC_XY_VEL_D_ACC": (0.2, 0.1, 2.0),
+    "MPC_XY_VEL_I_ACC": (0.4, 0.0, 60.0),
+    "MPC_XY_VEL_MAX": (12.0, 0.0, 20.0),
+    "MPC_XY_VEL_P_ACC": (1.8, 1.2, 5.0),
+    "MPC_Z_P": (1.0, 0.1, 1.5),
+    "MPC_Z_VEL_D_ACC": (0.0, 0.0, 2.0),
+    "MPC_Z_VEL_I_ACC": (2.0, 0.2, 3.0),
+    "MPC_Z_VEL_MAX_DN": (1.5, 0.5, 4.0),
+    "MPC_Z_VEL_MAX_UP": (3.0, 0.5, 8.0),
+    "MPC_Z_VEL_P_ACC": (4.0, 2.0, 15.0),
+    "MPC_Z_V_AUTO_DN": (1.5, 0.5, 4.0),
+    "MPC_Z_V_AUTO_UP": (3.0, 0.5, 8.0),
+    "NAV_ACC_RAD": (10.0, 0.05, 200.0),
+    "NAV_MC_ALT_RAD": (0.8, 0.05, 200.0),
+    "RTL_CONE_ANG": (45, 0, 90),
+    "RTL_MIN_DIST": (10.0, 0.5, 100.0),
+    "RTL_RETURN_ALT": (60.0, 0.0, 1000.0),
+    "SYS_AUTOSTART": (6001, 0, 9999999),
 }
+DEFAULTS = {name: default for name, (default, _, _) in _TABLE.items()}
+LIMITS = {name: (least, greatest) for name, (_, least, greatest) in _TABLE.items()}
 
 
 class Parameters:
     """The parameters in force. Reading and writing keep PX4's types; an unknown name raises KeyError."""
 
     def __init__(self, changes: dict[str, float | int] | None = None) -> None:
-        """Take the defaults, and `changes` over them; raises KeyError and TypeError as `set` does."""
+        """Take the defaults, and `changes` over them; raises what `set` raises."""
         self._values = dict(DEFAULTS)
         self._indices = {name: index for index, name in enumerate(sorted(DEFAULTS))}
         for name, value in (changes or {}).items():
@@ -117,9 +121,16 @@ class Parameters:
         return [self.parameter(name) for name in sorted(self._values)]
 
     def set(self, name: str, value: float | int) -> Parameter:
-        """Write a parameter; raises KeyError for an unknown name, TypeError for the wrong one of int and float."""
+        """Write a parameter, and return it as it stands then.
+
+        Raises KeyError for an unknown name, TypeError for the wrong one of int and float, and ValueError for what is
+        outside its range or not finite; the old value then stays.
+        """
         if isinstance(value, int) != isinstance(self._values[name], int):
             declared = "INT32" if isinstance(self._values[name], int) else "FLOAT"
             raise TypeError(f"parameter {name} is {declared}, but got {value!r}; write it in its own type")
+        least, greatest = LIMITS[name]
+        if not (math.isfinite(value) and least <= value <= greatest):
+            raise ValueError(f"parameter {name} is {value!r}; give a value from {least} to {greatest}")
         self._values[name] = value
         return self.parameter(name)

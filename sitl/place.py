@@ -10,17 +10,17 @@ _EARTH_RADIUS_M = 6371000.0  # PX4's MapProjection
 
 @dataclass(frozen=True, slots=True)
 class Origin:
-    """Where on Earth the world's NED origin lies; the default is PX4 SITL's."""
+    """Where on Earth the world's NED origin lies, latitude and longitude [rad], altitude [m]; by default PX4 SITL's."""
 
-    latitude_deg: float = 47.397742
-    longitude_deg: float = 8.545594
+    latitude_rad: float = math.radians(47.397742)
+    longitude_rad: float = math.radians(8.545594)
     altitude_m: float = 488.0
 
     def global_of(self, position_m: Vector) -> Vector:
-        """Latitude [deg], longitude [deg], altitude [m] of a position NED [m] (flat Earth: good within kilometres)."""
-        latitude = self.latitude_deg + math.degrees(position_m[0] / _EARTH_RADIUS_M)
-        around_m = _EARTH_RADIUS_M * math.cos(math.radians(self.latitude_deg))
-        return (latitude, self.longitude_deg + math.degrees(position_m[1] / around_m), self.altitude_m - position_m[2])
+        """Latitude [rad], longitude [rad], altitude [m] of a position NED [m] (flat Earth: good within kilometres)."""
+        latitude_rad = self.latitude_rad + position_m[0] / _EARTH_RADIUS_M
+        longitude_rad = self.longitude_rad + position_m[1] / (_EARTH_RADIUS_M * math.cos(self.latitude_rad))
+        return (latitude_rad, longitude_rad, self.altitude_m - position_m[2])
 
 
 @dataclass(frozen=True, slots=True)

@@ -11,6 +11,7 @@ from typing import Self
 
 import numpy as np
 
+_MAX_LOOKS = 100  # a write takes far less; a writer that died within one would keep the counter odd for ever
 _N_FIELDS = 8  # t_ns, north, east, down, qw, qx, qy, qz
 
 
@@ -37,6 +38,7 @@ class PoseBlock:
     def __init__(self, memory: shared_memory.SharedMemory, *, is_owner: bool) -> None:
         self._memory = memory
         self._is_owner = is_owner
+        self._last: Pose | None = None
         self._sequence = np.ndarray((1,), dtype=np.int64, buffer=memory.buf)
         self._t_ns = np.ndarray((1,), dtype=np.int64, buffer=memory.buf, offset=8)
         self._fields = np.ndarray((_N_FIELDS - 1,), dtype=np.float64, buffer=memory.buf, offset=16)
@@ -70,8 +72,11 @@ class PoseBlock:
         self._sequence[0] += 1
 
     def read(self) -> Pose | None:
-        """The newest pose; None before the first."""
-        while True:
+        """The newest pose; None before the first.
+
+        While a write does not come to its end, the last pose that was read here, or None if none was.
+        """
+        for _ in range(_MAX_LOOKS):
             before = int(self._sequence[0])
             if before == 0:
                 return None
@@ -79,7 +84,9 @@ class PoseBlock:
                 t_ns = int(self._t_ns[0])
                 north_m, east_m, down_m, w, x, y, z = self._fields.tolist()
                 if int(self._sequence[0]) == before:
-                    return Pose(t_ns, north_m, east_m, down_m, (w, x, y, z))
+                    self._last = Pose(t_ns, north_m, east_m, down_m, (w, x, y, z))
+                    break
+        return self._last
 
     def close(self) -> None:
         """Let go of the block; the owner's close ends it."""

@@ -14,8 +14,8 @@ from sitl.wind import Wind
 
 _STEP_NS = 4_000_000  # 250 Hz of flight time
 _STEP_S = _STEP_NS / NS_PER_S
-_MAX_BURST = 50  # steps without a look at the clock; more debt than a second of wall time is forgiven
-_FORGIVE_WALL_NS = NS_PER_S // 4
+_MAX_BURST = 50  # steps without a look at the clock; the sockets are served after each
+_FORGIVE_WALL_NS = NS_PER_S // 4  # of lateness; more is forgiven
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,8 +23,8 @@ class SitlSettings:
     """How the simulated vehicle is run.
 
     `port` is the application's UDP port; `wind_m_s` the mean wind at 20 ft, whose direction `seed` draws;
-    `start_yaw_rad` the heading at start; latitude, longitude and altitude place the world's NED origin, where the
-    vehicle stands at start; `pose_block` names the shared memory that gets the true pose (None: nobody looks).
+    `start_yaw_rad` the heading at start; `origin` places the world's NED frame, where the vehicle stands at start;
+    `pose_block` names the shared memory that gets the true pose (None: nobody looks).
     """
 
     port: int
@@ -32,9 +32,7 @@ class SitlSettings:
     wind_m_s: float
     clock: ScaledClock
     start_yaw_rad: float
-    latitude_deg: float
-    longitude_deg: float
-    altitude_m: float
+    origin: Origin
     pose_block: str | None
 
 
@@ -62,7 +60,7 @@ def run(settings: SitlSettings, should_stop: Callable[[], bool]) -> SitlSummary:
         Vehicle(yaw_rad=settings.start_yaw_rad),
         Wind(settings.wind_m_s, settings.seed),
         seed=settings.seed,
-        origin=Origin(settings.latitude_deg, settings.longitude_deg, settings.altitude_m),
+        origin=settings.origin,
         speed=max(1.0, clock.speed),
     )
     pose_block = PoseBlock.attach(settings.pose_block) if settings.pose_block is not None else None

@@ -53,8 +53,10 @@ class TakeoffRamp:
         """The climb [m/s] that may be asked for now, at most `limit_m_s`; negative while the ramp is still low."""
         if self.state is not Ramp.RAMPUP:
             return limit_m_s
-        progress = min(1.0, self._since_s / self._parameters.get("MPC_TKO_RAMP_T"))
-        return self._low_m_s + progress * (limit_m_s - self._low_m_s)
+        ramp_s = self._parameters.get("MPC_TKO_RAMP_T")
+        if self._since_s >= ramp_s:  # also a ramp of no length, which is done as it begins
+            return limit_m_s
+        return self._low_m_s + self._since_s / ramp_s * (limit_m_s - self._low_m_s)
 
     def _enter(self, state: Ramp) -> None:
         if state is not self.state:

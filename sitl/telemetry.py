@@ -45,8 +45,8 @@ def _us(autopilot: SimAutopilot) -> int:
 
 
 def _e7(autopilot: SimAutopilot, position_m: Vector) -> tuple[int, int, int]:
-    latitude, longitude, altitude_m = autopilot.origin.global_of(position_m)
-    return round(latitude * 1e7), round(longitude * 1e7), round(altitude_m * 1e3)
+    latitude_rad, longitude_rad, altitude_m = autopilot.origin.global_of(position_m)
+    return round(math.degrees(latitude_rad) * 1e7), round(math.degrees(longitude_rad) * 1e7), round(altitude_m * 1e3)
 
 
 def _heartbeat(autopilot: SimAutopilot) -> Fields:

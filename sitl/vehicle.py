@@ -132,10 +132,14 @@ class Vehicle:
             self._rest(ground_m)
             return
         vn, ve, vd = vn + acceleration[0] * dt_s, ve + acceleration[1] * dt_s, vd + acceleration[2] * dt_s
+        n, e, d = n + vn * dt_s, e + ve * dt_s, d + vd * dt_s
+        ground_m = self.ground(n, e)
+        self.is_on_ground = d >= ground_m
+        if self.is_on_ground:  # however hard the motors pull, the ground is not passed
+            d, vd = ground_m, min(vd, 0.0)
         self.acceleration_m_s2 = acceleration
         self.velocity_m_s = (vn, ve, vd)
-        self.position_m = (n + vn * dt_s, e + ve * dt_s, d + vd * dt_s)
-        self.is_on_ground = False
+        self.position_m = (n, e, d)
 
         p, q, r = self.rates_rad_s
         ix, iy, iz = frame.inertia_kg_m2

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
 from sitl.catenary import hang
+from sitl.place import Origin
 
 DEFAULT_WORLD = "medium_voltage"
 CONDUCTOR_STEP_M = 0.5
@@ -23,15 +24,6 @@ GroundStyle = Literal["pasture"]
 
 class WorldError(Exception):
     """A world could not be read; the message is one sentence for a person."""
-
-
-@dataclass(frozen=True, slots=True)
-class Origin:
-    """Where the vehicle stands at start, which is the origin of NED: latitude and longitude [rad], altitude [m]."""
-
-    latitude_rad: float
-    longitude_rad: float
-    altitude_m: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -105,13 +97,6 @@ class World:
     conductors: tuple[Conductor, ...]
     ground: Ground
     sun: Sun
-
-    @property
-    def line_height_m(self) -> float:
-        """Height above the ground [m] that clears the whole line, poles included; 0 without a line."""
-        downs = [support.top_ned_m[2] for support in self.supports]
-        downs += [float(conductor.points_ned_m[:, 2].min()) for conductor in self.conductors]
-        return -min(downs, default=0.0)
 
 
 class _Model(BaseModel):

@@ -140,7 +140,10 @@ def open_recording(path: Path, settings: CameraSettings, clock: Clock) -> Record
     file, nothing in it can be decoded, or its size is not the one of `settings`.
     """
     if path.is_dir():
-        paths = sorted(entry for entry in path.iterdir() if entry.suffix.lower() in IMAGE_SUFFIXES)
+        try:
+            paths = sorted(entry for entry in path.iterdir() if entry.suffix.lower() in IMAGE_SUFFIXES)
+        except OSError as error:
+            raise CameraError(f"The folder {path} cannot be read: {error.strerror}.") from None
         if not paths:
             raise CameraError(f"The folder {path} holds no images; name a folder with .png or .jpg files.")
     elif not path.exists():

@@ -88,9 +88,10 @@ class V4l2Camera:
                 frame.setflags(write=False)
                 self._mailbox.put(Frame(seq, t_capture_ns, frame))
                 seq += 1
-        except (CameraError, cv2.error) as error:
-            is_ours = isinstance(error, CameraError)
-            self._mailbox.close(error if is_ours else CameraError(f"The camera {self._device} failed: {error}"))
+        except CameraError as error:
+            self._mailbox.close(error)
+        except Exception as error:  # a thread that ends silently would look like the end of a recording
+            self._mailbox.close(CameraError(f"The camera {self._device} failed: {error}"))
         finally:
             self._mailbox.close()
             self._capture.release()

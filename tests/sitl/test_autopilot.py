@@ -182,6 +182,25 @@ def test_hold_stays_in_the_wind() -> None:
     assert math.dist(before, flight.autopilot.vehicle.position_m) < 2.0
 
 
+def test_gusts_drift_past_at_the_speed_through_the_air() -> None:
+    class SteadyWind(Wind):
+        """Blows 5 m/s northwards and keeps the airspeeds that it was told."""
+
+        def __init__(self) -> None:
+            super().__init__(5.0, 0, math.pi)
+            self.airspeeds_m_s: list[float] = []
+
+        def step(self, dt_s: float, height_m: float, airspeed_m_s: float) -> tuple[float, float, float]:
+            self.airspeeds_m_s.append(airspeed_m_s)
+            return (5.0, 0.0, 0.0)
+
+    wind = SteadyWind()
+    autopilot = SimAutopilot(wind=wind)
+    for _ in range(3):
+        autopilot.step(STEP_S)
+    assert wind.airspeeds_m_s == [0.0, 5.0, 5.0]
+
+
 def test_it_flies_again_after_a_landing() -> None:
     flight = Flight()
     flight.take_off()
@@ -353,6 +372,37 @@ def test_return_from_afar_climbs_first() -> None:
     assert flight.autopilot.vehicle.height_m > 23.5
     flight.run_until(lambda: not flight.autopilot.is_armed, within_s=120.0)
     assert math.hypot(*flight.autopilot.vehicle.position_m[:2]) < 1.5
+
+
+@pytest.mark.parametrize("away_m", [0.0, 5.0])
+def test_return_turns_as_home_was_to_land(away_m: float) -> None:
+    flight = Flight()
+    flight.take_off()
+    assert flight.autopilot.home is not None
+    home_yaw_rad = flight.autopilot.home.yaw_rad
+    flight.go_offboard(away_m)
+    assert flight.target is not None
+    flight.target = (*flight.target[:3], home_yaw_rad + 2.5)
+    flight.run(6.0)
+    flight.target = None
+    flight.autopilot.set_mode(Mode.RTL)
+    flight.run_until(lambda: flight.autopilot.landed is Landed.LANDING)
+    flight.run(5.0)
+    assert euler_of(flight.autopilot.estimate.quaternion)[2] == pytest.approx(home_yaw_rad, abs=0.05)
+
+
+@pytest.mark.parametrize("altitude_m", [6.0, 6.25, 6.5, 6.75])
+def test_return_announces_its_heights_rounded_up(altitude_m: float) -> None:
+    flight = Flight({"MIS_TAKEOFF_ALT": altitude_m})
+    flight.take_off()
+    assert flight.autopilot.home is not None
+    home_down_m, down_m = flight.autopilot.home.position_m[2], flight.autopilot.estimate.position_m[2]
+    flight.autopilot.set_mode(Mode.RTL)
+    flight.step()
+    flight.run(0.1)
+    (text,) = [text for _, text in flight.texts if text.startswith("RTL: start")]
+    amsl_m, above_m = math.ceil(488.0 - down_m), math.ceil(home_down_m - down_m)
+    assert text == f"RTL: start return at {amsl_m} m ({above_m} m above destination)"
 
 
 # --- battery ---

@@ -52,6 +52,19 @@ def test_small_errors_ask_for_gain_times_error() -> None:
     assert control.rates_setpoint_rad_s(quaternion_of(0, 0, 0.01), level)[2] == pytest.approx(2.8 * 0.01, rel=1e-3)
 
 
+def test_a_thrust_limit_below_the_horizontal_margin_is_kept() -> None:
+    control = PositionControl(Parameters({"MPC_THR_MAX": 0.2}), HOVER)
+    for _ in range(50):
+        assert math.hypot(*control.step(0.004, setpoint(500.0), resting())) <= 0.2 + 1e-9
+
+
+def test_without_yaw_weight_only_tilt_is_corrected() -> None:
+    control = AttitudeControl(Parameters({"MC_YAW_WEIGHT": 0.0}))
+    rates = control.rates_setpoint_rad_s(quaternion_of(0.01, 0.0, 1.0), (1.0, 0.0, 0.0, 0.0))
+    assert rates[0] > 0.01
+    assert rates[2] == pytest.approx(0.0, abs=1e-3)
+
+
 def test_yaw_takes_the_short_way() -> None:
     control = AttitudeControl(Parameters())
     actual, wanted = quaternion_of(0, 0, math.radians(170)), quaternion_of(0, 0, math.radians(-170))

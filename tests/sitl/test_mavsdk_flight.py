@@ -15,6 +15,7 @@ import pytest
 from pymavlink.dialects.v20 import all as dialect
 
 from drivers.clock import ScaledClock
+from sitl.place import Origin
 from sitl.pose import PoseBlock
 from sitl.server import SitlSettings, run
 
@@ -74,7 +75,7 @@ def flown() -> Flown:
     port, context = free_port(), multiprocessing.get_context("spawn")
     stop, pose_block = context.Event(), PoseBlock.create()
     clock = ScaledClock(SPEED, time.monotonic_ns())
-    settings = SitlSettings(port, 1, 0.0, clock, 0.0, 47.397742, 8.545594, 488.0, pose_block.name)
+    settings = SitlSettings(port, 1, 0.0, clock, 0.0, Origin(), pose_block.name)
     vehicle = context.Process(target=run, args=(settings, stop.is_set))
     vehicle.start()
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as station:
@@ -123,6 +124,18 @@ def test_the_example_flies_to_its_end(flown: Flown) -> None:
         "disarmed",
     ]
     assert flown.true_north_m == pytest.approx(20.0, abs=2.0)
+
+
+def test_a_flight_that_cannot_begin_ends_in_a_sentence() -> None:
+    done = subprocess.run(
+        [sys.executable, str(ROOT / "examples/fly_offboard.py"), "--connection", "no-such-link"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 1
+    assert "The flight ended early: " in done.stderr
+    assert "Traceback" not in done.stderr
 
 
 def test_modes_and_armed_states_come_in_px4s_order(flown: Flown) -> None:

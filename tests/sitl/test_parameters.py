@@ -1,8 +1,12 @@
-"""Parameters keep PX4's names and types."""
+"""Parameters keep PX4's names, types and ranges, and the vehicle bears every value within them."""
+
+import math
 
 import pytest
 
-from sitl.parameters import DEFAULTS, Parameters
+from sitl.autopilot import SimAutopilot
+from sitl.modes import Answer
+from sitl.parameters import DEFAULTS, LIMITS, Parameters
 
 
 def test_defaults_are_px4s() -> None:
@@ -38,3 +42,46 @@ def test_the_wrong_type_is_refused(name: str, value: float) -> None:
 def test_an_unknown_name_is_refused() -> None:
     with pytest.raises(KeyError):
         Parameters().set("NO_SUCH_PARAM", 1.0)
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf, -math.inf, -0.1, 5.1])
+def test_a_value_out_of_range_is_refused_and_the_old_one_stays(value: float) -> None:
+    parameters = Parameters()
+    with pytest.raises(ValueError, match=r"MPC_TKO_RAMP_T .* from 0\.0 to 5\.0"):
+        parameters.set("MPC_TKO_RAMP_T", value)
+    assert parameters.get("MPC_TKO_RAMP_T") == 3.0
+
+
+def test_defaults_lie_within_their_limits_and_are_of_their_type() -> None:
+    for name, default in DEFAULTS.items():
+        least, greatest = LIMITS[name]
+        assert least <= default <= greatest
+        assert type(least) is type(default) is type(greatest)
+
+
+@pytest.mark.parametrize("name", sorted(LIMITS))
+def test_a_takeoff_bears_a_parameter_at_its_limits(name: str) -> None:
+    for value in LIMITS[name]:
+        autopilot = SimAutopilot(seed=1)
+        while not autopilot.commander.is_armable:
+            autopilot.step(0.01)
+        assert autopilot.arm() is autopilot.takeoff() is Answer.ACCEPTED
+        # Before the motors are up, so that the whole take-off is flown with it.
+        autopilot.set_parameter(name, value)
+        for _ in range(900):
+            autopilot.step(0.01)
+            n, e, d = autopilot.vehicle.position_m
+            assert math.isfinite(n + e + d + autopilot.thrust)
+            assert d <= 0.0
+
+
+@pytest.mark.parametrize(("name", "value"), [("MPC_TKO_RAMP_T", 0.0), ("MC_YAW_WEIGHT", 0.0)])
+def test_a_zero_that_px4_allows_still_takes_off(name: str, value: float) -> None:
+    autopilot = SimAutopilot(seed=1, parameters=Parameters({name: value}))
+    while not autopilot.commander.is_armable:
+        autopilot.step(0.01)
+    autopilot.arm()
+    autopilot.takeoff()
+    for _ in range(1000):
+        autopilot.step(0.01)
+    assert autopilot.vehicle.height_m == pytest.approx(2.2, abs=0.8)

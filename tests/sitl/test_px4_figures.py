@@ -1,4 +1,12 @@
-"""The model's step responses beside those of a real PX4 (tests/sitl/golden/px4_a_nominal.json)."""
+"""The model's step responses beside those of a real PX4 (tests/sitl/golden/px4_a_nominal.json).
+
+The golden figures were worked out by the very function that works out the model's, `nominal_flight.figures`, from the
+recording's messages: position and velocity from LOCAL_POSITION_NED, yaw and yaw rate from the ATTITUDE before each, the
+ground's height from the HOME_POSITION that was set at take-off, the leg's and the turn's targets from the application's
+SET_POSITION_TARGET_LOCAL_NED. Times are the messages' `time_boot_ms`. `moments` are when the commands (COMMAND_LONG
+400, 176, 21) and the turned setpoint were sent; heartbeats, landed states, acknowledgements and texts are what
+HEARTBEAT, EXTENDED_SYS_STATE, COMMAND_ACK and STATUSTEXT said, at the boot time of the message before.
+"""
 
 import json
 import math

@@ -97,6 +97,19 @@ def test_it_stands_on_the_ground_that_is_there() -> None:
     assert vehicle.height_m == 0.0
 
 
+def test_the_ground_stops_a_fall_although_the_motors_pull_up() -> None:
+    vehicle = aloft()
+    vehicle.position_m, vehicle.velocity_m_s = (0.0, 0.0, -0.02), (0.0, 0.0, 6.0)
+    vehicle.thrust_n = vehicle.airframe.max_thrust_n
+    downs_m = []
+    for _ in range(100):
+        vehicle.step(STEP_S, 1.0, STILL, STILL)
+        downs_m.append(vehicle.position_m[2])
+    assert max(downs_m) == 0.0
+    assert downs_m[-1] < -0.1
+    assert not vehicle.is_on_ground
+
+
 @given(
     torque=st.tuples(*[st.floats(-1, 1)] * 3),
     thrust=st.floats(0, 1),

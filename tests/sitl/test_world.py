@@ -108,7 +108,6 @@ def test_a_world_file_is_read_in_ned_and_radians(tmp_path: Path) -> None:
     )
     assert world.supports[0].insulators_ned_m == (((9.2, -30.0, -9.5), (9.2, -30.0, -9.7)),)
     assert conductor.points_ned_m[:, 2].max() == pytest.approx(-9.2)
-    assert world.line_height_m == pytest.approx(10.0)
     assert world.supports[1].arm_ends_ned_m[0] == pytest.approx((11.0, 10.0, -9.5))
 
 

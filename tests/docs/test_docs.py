@@ -1,0 +1,34 @@
+"""The documents: no dead link, and tables that are the code's."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+from mission.build import reactions
+from mission.plan import SafetyPlan
+from mission.safety import FIXED_REACTIONS, PRIORITY, Reaction
+
+ROOT = Path(__file__).parents[2]
+DOCUMENTS = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")])
+
+
+@pytest.mark.parametrize("document", DOCUMENTS, ids=lambda document: str(document.relative_to(ROOT)))
+def test_relative_links_lead_somewhere(document: Path) -> None:
+    links = re.findall(r"\]\((?!https?:|#)([^)#]+)", document.read_text(encoding="utf-8"))
+    assert [link for link in links if not (document.parent / link).exists()] == []
+
+
+def test_the_safety_page_has_the_table_of_the_code() -> None:
+    rows = re.findall(r"^\| `(\w+)` \|.*\| ([\w ]+?)( \(mission\))? \|$", (ROOT / "docs/safety.md").read_text(), re.M)
+    assert [row[0] for row in rows] == [str(hazard) for hazard in PRIORITY]
+    defaults = reactions(SafetyPlan()) | FIXED_REACTIONS
+    assert [Reaction(row[1].replace(" ", "_")) for row in rows] == [defaults[hazard] for hazard in PRIORITY]
+    assert [bool(row[2]) for row in rows] == [hazard not in FIXED_REACTIONS for hazard in PRIORITY]
+
+
+def test_the_readme_shows_the_shipped_mission() -> None:
+    readme = (ROOT / "README.md").read_text(encoding="utf-8")
+    shown = re.findall(r"^  - (\{task:[^}]+\})", readme, re.M)
+    shipped = re.findall(r"^  - (\{task:[^}]+\})", (ROOT / "missions/follow_line.yaml").read_text(), re.M)
+    assert shown == shipped
