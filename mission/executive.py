@@ -14,7 +14,7 @@ from drivers.clock import NS_PER_S, Clock
 from mission import machine as m
 from mission.autopilot import Autopilot, AutopilotError, FlightMode, NoAnswerError, Setpoint, VehicleState
 from mission.build import build_task, guidance_settings, reactions, safety_limits
-from mission.eyes import Eyes, GroupSize, StateHistory, sight_of
+from mission.eyes import Eyes, Lookout
 from mission.guidance import leash
 from mission.mode_watch import ModeWatch
 from mission.plan import MissionPlan
@@ -23,7 +23,7 @@ from mission.records import Event, MissionEnded, Result, Severity, TaskEnded, Ta
 from mission.reporting import FlightLog, Progress
 from mission.safety import Hazard, Reaction, SafetyInput, decide, find_hazards, keep_going_down, way_down
 from mission.tasks.go_down import GoDownTask
-from mission.tasks.task import Command, FlightMemory, Observation, Sight, Step, Task
+from mission.tasks.task import Command, FlightMemory, Observation, Step, Task
 
 CONTROL_RATE_HZ = 20.0
 PAUSE_BEFORE_GOING_DOWN_S = 2.0
@@ -51,19 +51,16 @@ class Executive:
         self._eyes = eyes
         self._log = log
         self._clock = clock
-        self._camera = camera
         self._guidance = guidance_settings(plan.guidance)
         self._limits = safety_limits(plan.safety)
         self._reactions = reactions(plan.safety)
         self._machine = m.FlightMachine([task.task for task in plan.tasks], self._on_change)
-        self._history = StateHistory()
-        self._group = GroupSize()
+        self._lookout = Lookout(eyes, log, camera, self._guidance)
         self._modes = ModeWatch()
         self._memory = FlightMemory(Setpoint(0.0, 0.0, 0.0, 0.0), 0.0)
         self._reference = self._memory.start
         self._task: Task | None = None
         self._task_started_ns = 0
-        self._line_seen_ns = 0
         self._may_be_over_line = False
         self._is_interrupted = False
         self._was_told_to_arm = False
@@ -155,7 +152,11 @@ class Executive:
         self._was_armed = self._was_armed or state.is_armed
         self._log.record(state)
         self._keep_status_texts()
-        sight = self._guarded_look(now_ns, state)
+        sight = None
+        try:
+            sight = self._lookout.look(now_ns, state)
+        except Exception as error:
+            self._internal_error = f"{type(error).__name__} while placing the line: {error}"
         self._show(state)
         if await self._react(now_ns, state):
             return
@@ -172,23 +173,6 @@ class Executive:
         self._task_failure = step.failed
         if step.done is not None:
             await self._end_task(Result.COMPLETED, step.done)
-
-    def _guarded_look(self, now_ns: int, state: VehicleState) -> Sight | None:
-        """The newest report since the last tick, on the map; the older ones are kept in the log alone."""
-        reports = self._eyes.take()
-        for report in reports:
-            self._log.record(report)
-        try:
-            self._history.add(state)
-            if not reports:
-                return None
-            sight = sight_of(reports[-1], self._history, self._group, self._camera, self._guidance, now_ns)
-        except Exception as error:
-            self._internal_error = f"{type(error).__name__} while placing the line: {error}"
-            return None
-        if sight is not None and sight.line is not None:
-            self._line_seen_ns = max(self._line_seen_ns, sight.t_capture_ns)
-        return sight
 
     async def _do(self, step: Step, state: VehicleState) -> None:
         """Send what the task wants."""
@@ -249,7 +233,7 @@ class Executive:
         plan = self._plan.tasks[index]
         self._task = build_task(plan, self._guidance, self._memory)
         self._task_started_ns = self._clock.now_ns()
-        self._line_seen_ns = self._task_started_ns
+        self._lookout.line_seen_ns = self._task_started_ns
         self._may_be_over_line = self._may_be_over_line or plan.task not in _STAYS_CLEAR
         self._log.record(TaskStarted(self._task_started_ns, index, plan.task))
 
@@ -311,7 +295,7 @@ class Executive:
             task_age_s=(now_ns - self._task_started_ns) / NS_PER_S,
             task_limit_s=GOING_DOWN_LIMIT_S if index is None else self._plan.tasks[index].time_limit_s,
             needs_line=task is not None and task.needs_line,
-            line_seen_ns=self._line_seen_ns,
+            line_seen_ns=self._lookout.line_seen_ns,
             needs_vision=task is not None and task.needs_vision,
             vision_failure=self._eyes.failure,
             task_failure=self._task_failure,

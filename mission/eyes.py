@@ -7,6 +7,7 @@ from drivers.camera.camera import Intrinsics
 from drivers.clock import NS_PER_S
 from mission.autopilot import VehicleState
 from mission.guidance import GuidanceSettings, locate_line, wrap_angle_rad
+from mission.reporting import FlightLog
 from mission.tasks.task import Sight
 from vision.records import VisionReport
 
@@ -124,3 +125,29 @@ def sight_of(
         line = locate_line(report.estimate, state, camera, guidance.height_over_line_m)
         is_whole = group.is_whole(report.estimate.n_lines)
     return Sight(report.t_capture_ns, state.yaw_rad, report.estimate, line, is_whole)
+
+
+class Lookout:
+    """Keeps what is needed to make a sight of each report. `line_seen_ns` is when the newest line was seen."""
+
+    def __init__(self, eyes: Eyes, log: FlightLog, camera: Intrinsics, guidance: GuidanceSettings) -> None:
+        self._eyes = eyes
+        self._log = log
+        self._camera = camera
+        self._guidance = guidance
+        self._history = StateHistory()
+        self._group = GroupSize()
+        self.line_seen_ns = 0
+
+    def look(self, now_ns: int, state: VehicleState) -> Sight | None:
+        """The newest report since the last look, on the map; the older ones are kept in the log alone."""
+        self._history.add(state)
+        reports = self._eyes.take()
+        for report in reports:
+            self._log.record(report)
+        if not reports:
+            return None
+        sight = sight_of(reports[-1], self._history, self._group, self._camera, self._guidance, now_ns)
+        if sight is not None and sight.line is not None:
+            self.line_seen_ns = max(self.line_seen_ns, sight.t_capture_ns)
+        return sight

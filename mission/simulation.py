@@ -24,6 +24,7 @@ from mission.autopilot import VehicleState
 from mission.plan import CameraPlan
 from mission.records import TrueLine, TruePose
 from sitl.camera import SimCamera
+from sitl.control import quaternion_of
 from sitl.map import render_map
 from sitl.pose import Pose, PoseBlock
 from sitl.server import SitlSettings, SitlSummary, run
@@ -105,7 +106,7 @@ class TelemetryCamera:
 
     def feed(self, state: VehicleState) -> None:
         """Publish the vehicle's state as the camera's pose."""
-        quaternion = _quaternion(state.roll_rad, state.pitch_rad, state.yaw_rad)
+        quaternion = quaternion_of(state.roll_rad, state.pitch_rad, state.yaw_rad)
         self._poses.write(Pose(state.t_ns, state.north_m, state.east_m, state.down_m, quaternion))
 
     def close(self) -> None:
@@ -182,19 +183,6 @@ def _serve(settings: SitlSettings, stop: ProcessEvent, summaries: Connection) ->
         signal.signal(number, signal.SIG_IGN)
     parent = os.getppid()
     summaries.send(run(settings, lambda: stop.is_set() or os.getppid() != parent))
-
-
-def _quaternion(roll_rad: float, pitch_rad: float, yaw_rad: float) -> tuple[float, float, float, float]:
-    """Quaternion (w, x, y, z) ned_from_frd of the Euler angles yaw, pitch, roll in this order."""
-    cr, sr = math.cos(roll_rad / 2), math.sin(roll_rad / 2)
-    cp, sp = math.cos(pitch_rad / 2), math.sin(pitch_rad / 2)
-    cy, sy = math.cos(yaw_rad / 2), math.sin(yaw_rad / 2)
-    return (
-        cr * cp * cy + sr * sp * sy,
-        sr * cp * cy - cr * sp * sy,
-        cr * sp * cy + sr * cp * sy,
-        cr * cp * sy - sr * sp * cy,
-    )
 
 
 def world_path_or_name(text: str | None) -> str | None:

@@ -10,7 +10,7 @@ from mission.log.canvas import ACCENT, BAD, DIM_INK, GOOD, PANEL, SHADOW, Align,
 from mission.log.measures import nearest_on_axis
 from mission.log.reader import Flight
 from mission.log.strip_chart import Strip, draw_strip
-from mission.log.summary import FOLLOW_TASK, FlightReport, true_axis
+from mission.log.summary import FOLLOW_TASK, FlightReport, flight_start_ns, true_axis
 from mission.log.track_map import MapBackground, MapView, draw_map, map_view
 from mission.log.wording import words_of
 from mission.records import Result
@@ -76,7 +76,7 @@ def _draw_frames(canvas: Canvas, flight: Flight, report: FlightReport) -> int:
     for place in range(2):
         box = Box(_RIGHT_X + place * (width_px + _FRAME_GAP_PX), MAP_BOX.y, width_px, height_px)
         if place < len(chosen):
-            _draw_frame(canvas, box, chosen[place], flight.mission.start_ns)
+            _draw_frame(canvas, box, chosen[place], flight_start_ns(flight))
         else:
             canvas.panel(box, PANEL)
             canvas.text((box.x + width_px / 2, box.y + height_px / 2), "no frame", 17, DIM_INK, align=Align.MIDDLE)
@@ -94,7 +94,7 @@ def choose_frames(flight: Flight, report: FlightReport) -> list[VisionReport]:
     shares = (0.5, 0.5) if len(windows) > 1 else (0.33, 0.67)
     chosen: list[VisionReport] = []
     for (start_s, end_s), share in zip(wanted_s, shares, strict=True):
-        wanted_ns = flight.mission.start_ns + (start_s + share * (end_s - start_s)) * NS_PER_S
+        wanted_ns = flight_start_ns(flight) + (start_s + share * (end_s - start_s)) * NS_PER_S
         left = [seen for seen in with_lines if all(seen is not other for other in chosen)]
         chosen.append(min(left, key=lambda seen: abs(seen.t_capture_ns - wanted_ns)))
     return sorted(chosen, key=lambda seen: seen.t_capture_ns)
@@ -133,7 +133,7 @@ def _draw_strips(canvas: Canvas, top: int, flight: Flight, report: FlightReport)
 
     def strip(title: str, unit: str, values: list[tuple[int, float]], least_limit: float, color: Color) -> Strip:
         timed = np.array(
-            [((t_ns - flight.mission.start_ns) / NS_PER_S, value) for t_ns, value in values], dtype=np.float64
+            [((t_ns - flight_start_ns(flight)) / NS_PER_S, value) for t_ns, value in values], dtype=np.float64
         ).reshape(-1, 2)
         is_shown = np.zeros(len(timed), dtype=np.bool_)
         for window_start_s, window_end_s in windows:

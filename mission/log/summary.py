@@ -111,7 +111,10 @@ class EventSummary:
 
 @dataclass(frozen=True, slots=True)
 class FlightReport:
-    """A flight in figures. `lateral` and `yaw_error` need ground truth, which only a simulated flight has."""
+    """A flight in figures. Times [s] are since the flight's start (`flight_start_ns`).
+
+    `lateral` and `yaw_error` need ground truth, which only a simulated flight has.
+    """
 
     mission: str
     result: str
@@ -135,7 +138,7 @@ def summarise(flight: Flight) -> FlightReport:
     end_ns = flight.end_ns if ended is None else ended.t_ns
 
     def since_start_s(t_ns: int) -> float:
-        return (t_ns - flight.mission.start_ns) / NS_PER_S
+        return (t_ns - flight_start_ns(flight)) / NS_PER_S
 
     following = [_span_window(span, flight.end_ns) for span in spans if span.task == FOLLOW_TASK]
     lateral_m, yaw_error_rad = _true_errors(flight, following)
@@ -170,6 +173,11 @@ def summarise(flight: Flight) -> FlightReport:
             for event in flight.events
         ),
     )
+
+
+def flight_start_ns(flight: Flight) -> int:
+    """When the first task began; the log's start where none did. Getting ready before it is not flight."""
+    return flight.tasks_started[0].t_ns if flight.tasks_started else flight.mission.start_ns
 
 
 def to_json(report: FlightReport) -> dict[str, Any]:
