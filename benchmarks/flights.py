@@ -97,7 +97,7 @@ def summary(flights: list[tuple[float, dict[str, Any]]]) -> str:
 def main() -> None:
     """Fly them all."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0] if __doc__ else None)
-    parser.add_argument("--speed", type=float, default=1.5)
+    parser.add_argument("--speed", type=float, default=2.0)
     parser.add_argument("--seeds", type=int, default=5)
     parser.add_argument("--wind", type=float, nargs="+", default=[0.0, 4.0, 8.0])
     parser.add_argument("--out", type=Path, default=ROOT / "docs" / "benchmarks.md")
