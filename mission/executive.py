@@ -29,6 +29,9 @@ CONTROL_RATE_HZ = 20.0
 PAUSE_BEFORE_GOING_DOWN_S = 2.0
 GOING_DOWN_LIMIT_S = 300.0
 
+MAX_MISSED_SETPOINTS = 2
+"""In a row; each takes its time limit of half a second."""
+
 _STAYS_CLEAR = ("takeoff", "ascend", "descend", "rotate", "hold", "land", "return")
 """Tasks that do not carry the vehicle anywhere over ground by themselves; the others may bring it over the line."""
 
@@ -65,6 +68,7 @@ class Executive:
         self._is_interrupted = False
         self._was_told_to_arm = False
         self._was_armed = False
+        self._n_missed_setpoints = 0
         self._task_failure: str | None = None
         self._refusal: str | None = None
         self._internal_error: str | None = None
@@ -191,12 +195,22 @@ class Executive:
             return
         if self._modes.is_offboard:
             self._reference = leash(step.setpoint, state, self._guidance.leash_m)
-            await self._autopilot.set_setpoint(self._reference)
+            await self._send_setpoint()
         else:
             # The first setpoint is where the vehicle is: entering offboard must not move it.
             self._reference = Setpoint(state.north_m, state.east_m, state.down_m, self._reference.yaw_rad)
             await self._command(self._autopilot.start_offboard(self._reference), FlightMode.OFFBOARD)
         self._log.record_setpoint(self._clock.now_ns(), self._reference)
+
+    async def _send_setpoint(self) -> None:
+        """Send the reference; one that is not taken in time may be missed, as the one before it is repeated."""
+        try:
+            await self._autopilot.set_setpoint(self._reference)
+            self._n_missed_setpoints = 0
+        except NoAnswerError:
+            self._n_missed_setpoints += 1
+            if self._n_missed_setpoints > MAX_MISSED_SETPOINTS:
+                raise
 
     async def _command(self, call: Awaitable[None], *modes: FlightMode) -> None:
         """Send a command that leads to one of `modes`."""

@@ -236,6 +236,16 @@ def test_the_last_landing_is_commanded_again(fault: str) -> None:
     assert not flown.autopilot.sim.is_armed
 
 
+@pytest.mark.parametrize(("n_missed", "result"), [(2, Result.COMPLETED), (3, Result.FAILED)])
+def test_a_setpoint_may_be_missed_but_not_three_in_a_row(n_missed: int, result: Result) -> None:
+    def miss(cockpit: Cockpit) -> None:
+        cockpit.autopilot.faults["setpoint"] = ["lost"] * n_missed
+
+    flown = fly(ALL_TASKS_PLAN, in_task="follow_lines", do=miss)
+    assert flown.ended.result is result, flown.story
+    assert not flown.autopilot.sim.is_armed
+
+
 def test_a_refused_offboard_brings_the_vehicle_down() -> None:
     def spoil(cockpit: Cockpit) -> None:
         cockpit.autopilot.faults["offboard"] = ["refused"]

@@ -107,6 +107,9 @@ class InProcessAutopilot:
 
     async def set_setpoint(self, setpoint: Setpoint) -> None:
         self.catch_up()
+        faults = self.faults.get("setpoint", [])
+        if faults:
+            raise NoAnswerError(f"the setpoint was {faults.pop(0)}")
         self.n_setpoints += 1
         self._setpoint = (setpoint.north_m, setpoint.east_m, setpoint.down_m, setpoint.yaw_rad)
         self.sim.set_position_setpoint(*self._setpoint)
