@@ -40,7 +40,7 @@ class LineEstimate:
     t_capture_ns: int
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)  # arrays have no single answer to ==
 class Detection:
     """All that the pipeline found in one image; `angle_rad` and `offset_px` as in LineEstimate.
 
@@ -64,7 +64,7 @@ class Detection:
         return LineEstimate(self.angle_rad, self.offset_px, self.n_lines, self.confidence, t_capture_ns)
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)  # arrays have no single answer to ==
 class VisionReport:
     """What the vision worker sends for each frame it worked on.
 
