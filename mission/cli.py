@@ -233,7 +233,7 @@ def _finish(outcome: "FlightOutcome", *, as_json: bool, simulation: "Simulation 
     except LogError as error:
         sys.stderr.write(f"{error}\nThe mission {outcome.ended.result}: {outcome.ended.reason}.\n")
         raise typer.Exit(_exit_code(outcome)) from None
-    picture = _draw(outcome.log, simulation)
+    picture = _draw(outcome.log, simulation) if report.tasks else None
     if as_json:
         from mission.log.summary import to_json
 
