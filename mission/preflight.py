@@ -67,5 +67,5 @@ def _missing(autopilot: Autopilot, eyes: Eyes) -> list[str]:
     if rest is not None:
         missing.append(rest)
     if not eyes.is_ready:
-        missing.append("vision: waiting for the first frame")
+        missing.append("the first frame through vision")
     return missing

@@ -28,7 +28,7 @@ class Watch:
     def __init__(self, plan: MissionPlan, console: Console) -> None:
         self._plan = plan
         self._console = console
-        self._shown: tuple[str, tuple[str, ...]] | None = None
+        self._shown: tuple[str, tuple[str, ...]] = ("", ())
         self._live = Live(console=console, auto_refresh=False, transient=True) if console.is_terminal else None
         self._news: Mailbox[Progress] = Mailbox()
         self._thread = threading.Thread(target=self._print_all, name="watch", daemon=True)
@@ -58,12 +58,11 @@ class Watch:
     def _print(self, progress: Progress) -> None:
         if self._live is not None:
             self._live.update(self._line(progress), refresh=True)
-        now = (progress.stage, progress.waiting_for)
+        # In a terminal, what is waited for stands in the live line alone.
+        now = (progress.stage, progress.waiting_for if self._live is None else ())
         if now != self._shown:
-            is_news = self._shown is None or self._shown[0] != progress.stage or bool(progress.waiting_for)
             self._shown = now
-            if is_news:
-                self._console.print(self._line(progress), soft_wrap=True, highlight=False)
+            self._console.print(self._line(progress), soft_wrap=True, highlight=False)
 
     def _line(self, progress: Progress) -> Text:
         number = "" if progress.task_index is None else f"{progress.task_index + 1}/{len(self._plan.tasks)} "
