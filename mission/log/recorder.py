@@ -90,16 +90,6 @@ class Recorder:
             )
         return None
 
-    @property
-    def n_dropped_images(self) -> int:
-        """Images left out because the disk was too slow."""
-        return self._backlog.n_dropped_images
-
-    @property
-    def n_dropped_records(self) -> int:
-        """Records left out because the disk was far too slow."""
-        return self._backlog.n_dropped_records
-
     def record(self, item: object) -> None:
         """Log a record of the flight: any record type of mission.log.channels, or a VisionReport."""
         self._backlog.put(item)
