@@ -7,30 +7,25 @@ task for the next step, and sends it. It never waits for vision. [Ceron] section
 import asyncio
 import contextlib
 import math
-from collections.abc import Awaitable
 
 from drivers.camera.camera import Intrinsics
 from drivers.clock import NS_PER_S, Clock
 from mission import machine as m
-from mission.autopilot import Autopilot, AutopilotError, FlightMode, NoAnswerError, Setpoint, VehicleState
+from mission.autopilot import Autopilot, AutopilotError, Setpoint, VehicleState
 from mission.build import build_task, guidance_settings, reactions, safety_limits
 from mission.eyes import Eyes, Lookout
-from mission.guidance import leash
-from mission.mode_watch import ModeWatch
+from mission.helm import Helm
 from mission.plan import MissionPlan
-from mission.preflight import not_at_rest, wait_until_ready
+from mission.preflight import wait_until_ready
 from mission.records import Event, MissionEnded, Result, Severity, TaskEnded, TaskStarted
 from mission.reporting import FlightLog, Progress
 from mission.safety import Hazard, Reaction, SafetyInput, decide, find_hazards, keep_going_down, way_down
 from mission.tasks.go_down import GoDownTask
-from mission.tasks.task import Command, FlightMemory, Observation, Step, Task
+from mission.tasks.task import Command, FlightMemory, Observation, Task
 
 CONTROL_RATE_HZ = 20.0
 PAUSE_BEFORE_GOING_DOWN_S = 2.0
 GOING_DOWN_LIMIT_S = 300.0
-
-MAX_MISSED_SETPOINTS = 2
-"""In a row; each takes its time limit of half a second."""
 
 _STAYS_CLEAR = ("takeoff", "ascend", "descend", "rotate", "hold", "land", "return")
 """Tasks that do not carry the vehicle anywhere over ground by themselves; the others may bring it over the line."""
@@ -59,16 +54,13 @@ class Executive:
         self._reactions = reactions(plan.safety)
         self._machine = m.FlightMachine([task.task for task in plan.tasks], self._on_change)
         self._lookout = Lookout(eyes, log, camera, self._guidance)
-        self._modes = ModeWatch()
+        self._helm = Helm(autopilot, log, clock, self._guidance.leash_m)
         self._memory = FlightMemory(Setpoint(0.0, 0.0, 0.0, 0.0), 0.0)
-        self._reference = self._memory.start
         self._task: Task | None = None
         self._task_started_ns = 0
         self._may_be_over_line = False
         self._is_interrupted = False
-        self._was_told_to_arm = False
         self._was_armed = False
-        self._n_missed_setpoints = 0
         self._task_failure: str | None = None
         self._refusal: str | None = None
         self._internal_error: str | None = None
@@ -79,7 +71,7 @@ class Executive:
     @property
     def may_have_armed(self) -> bool:
         """Whether the vehicle was armed, or told to without a refusal."""
-        return self._was_told_to_arm or self._was_armed
+        return self._helm.was_told_to_arm or self._was_armed
 
     def request_stop(self) -> None:
         """Ask the flight to end now: before arming at once, in the air by the mission's reaction."""
@@ -96,7 +88,7 @@ class Executive:
                 await self._fly()
             except BaseException:
                 # Cancelled, or a bug: no stream of setpoints may outlive us. In its own modes it holds by itself.
-                if self._modes.is_offboard:
+                if self._helm.modes.is_offboard:
                     with contextlib.suppress(AutopilotError):
                         await self._autopilot.hold()
                 raise
@@ -129,7 +121,7 @@ class Executive:
         start = Setpoint(state.north_m, state.east_m, state.down_m, state.yaw_rad)
         theta_0_rad = self._guidance.theta_0_rad
         self._memory = FlightMemory(start, state.yaw_rad if theta_0_rad is None else theta_0_rad)
-        self._reference = start
+        self._helm.reference = start
         return None
 
     # -- the control loop ----------------------------------------------------------------------------------------
@@ -164,10 +156,9 @@ class Executive:
         self._show(state)
         if await self._react(now_ns, state):
             return
-        step = Step()
         try:
-            step = self._task.step(self._reference, Observation(dt_s, state, sight))
-            await self._do(step, state)
+            step = self._task.step(self._helm.reference, Observation(dt_s, state, sight))
+            await self._helm.do(step, state)
         except AutopilotError as error:
             self._note_refusal(str(error))
             return
@@ -177,59 +168,6 @@ class Executive:
         self._task_failure = step.failed
         if step.done is not None:
             await self._end_task(Result.COMPLETED, step.done)
-
-    async def _do(self, step: Step, state: VehicleState) -> None:
-        """Send what the task wants."""
-        if step.next_mode is not None:
-            self._modes.announce(step.next_mode)
-        if step.command is Command.ARM:
-            await self._arm(state)
-        elif step.command is Command.TAKEOFF:
-            await self._command(self._autopilot.takeoff(step.altitude_m), FlightMode.TAKEOFF)
-        elif step.command is Command.RETURN:
-            # Its end, the landing, may be shown as LAND.
-            await self._command(self._autopilot.return_home(), FlightMode.RETURN, FlightMode.LAND)
-        elif step.command is Command.LAND:
-            await self._command(self._autopilot.land(), FlightMode.LAND)
-        if step.setpoint is None:
-            return
-        if self._modes.is_offboard:
-            self._reference = leash(step.setpoint, state, self._guidance.leash_m)
-            await self._send_setpoint()
-        else:
-            # The first setpoint is where the vehicle is: entering offboard must not move it.
-            self._reference = Setpoint(state.north_m, state.east_m, state.down_m, self._reference.yaw_rad)
-            await self._command(self._autopilot.start_offboard(self._reference), FlightMode.OFFBOARD)
-        self._log.record_setpoint(self._clock.now_ns(), self._reference)
-
-    async def _send_setpoint(self) -> None:
-        """Send the reference; one that is not taken in time may be missed, as the one before it is repeated."""
-        try:
-            await self._autopilot.set_setpoint(self._reference)
-            self._n_missed_setpoints = 0
-        except NoAnswerError:
-            self._n_missed_setpoints += 1
-            if self._n_missed_setpoints > MAX_MISSED_SETPOINTS:
-                raise
-
-    async def _command(self, call: Awaitable[None], *modes: FlightMode) -> None:
-        """Send a command that leads to one of `modes`."""
-        self._modes.announce(*modes)
-        await call
-        self._modes.accept(self._clock.now_ns(), *modes)
-
-    async def _arm(self, state: VehicleState) -> None:
-        rest = not_at_rest(state)
-        if rest is not None:
-            raise AutopilotError(f"not armed: we wait for {rest}")
-        try:
-            self._was_told_to_arm = True
-            await self._autopilot.arm()
-        except NoAnswerError:
-            raise  # it may have armed all the same
-        except AutopilotError:
-            self._was_told_to_arm = False
-            raise
 
     def _note_refusal(self, words: str) -> None:
         """On the way down a refusal is noted, and the task asks again; before that it is a hazard."""
@@ -274,7 +212,7 @@ class Executive:
         hazards = find_hazards(self._safety_input(now_ns, state), self._limits)
         if is_going_down:
             hazards = keep_going_down(hazards)
-        decision = decide(hazards, self._reactions, is_offboard=self._modes.is_offboard)
+        decision = decide(hazards, self._reactions, is_offboard=self._helm.modes.is_offboard)
         for hazard, words in hazards.items():
             if hazard not in self._noted and (decision is None or hazard is not decision[0]):
                 self._noted.add(hazard)
@@ -301,7 +239,7 @@ class Executive:
         return SafetyInput(
             now_ns=now_ns,
             state=state,
-            allowed_modes=self._modes.explained(now_ns, state),
+            allowed_modes=self._helm.modes.explained(now_ns, state),
             distance_m=self._from_start_m(state),
             altitude_m=self._memory.start.down_m - state.down_m,
             was_armed=self._was_armed,
@@ -333,7 +271,7 @@ class Executive:
             return  # it is on that way already
         self._task = GoDownTask(command, PAUSE_BEFORE_GOING_DOWN_S)
         try:
-            await self._command(self._autopilot.hold(), FlightMode.HOLD)
+            await self._helm.hold()
         except AutopilotError as error:  # then the way down is all the more urgent, and goes on
             self._note_refusal(str(error))
 
