@@ -63,8 +63,8 @@ def vision_settings(plan: p.VisionPlan) -> VisionSettings:
     defaults = VisionSettings()
     return replace(
         defaults,
-        presence_min_length_share=defaults.presence_min_length_share * plan.presence_scale,
-        presence_min_reach=min(1.0, defaults.presence_min_reach * plan.presence_scale),
+        presence_min_support=min(1.0, defaults.presence_min_support * plan.presence_scale),
+        presence_min_sigmas=defaults.presence_min_sigmas * plan.presence_scale,
     )
 
 

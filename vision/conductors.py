@@ -1,7 +1,8 @@
-"""Conductors among parallel segments: what stands for one conductor, and how sure that is.
+"""Conductors among straight edges: which two edges bound one, and what a person would look at to tell.
 
-A conductor crosses the whole frame, and it is thin: it shows two edges of opposite polarity close to each other, where
-a kerb or the border of a field shows one.
+A conductor crosses the whole frame, it is thin, and it is the same all along while the ground below it changes: its two
+edges face each other, where a kerb or the border of a field shows one. A thick one is round, and shows further edges
+inside, where its bright middle begins and ends.
 """
 
 import math
@@ -10,34 +11,43 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from vision.edge_lines import EdgeLines
 from vision.linking import segment_lengths_px
 from vision.orientation import segment_angles_rad
-from vision.records import Segments
+from vision.profile import measure_profile
 
-_ASIDE_PX = 2.0  # how far from a conductor's edge a piece of it may lie
-_BEND_OVERLAP = 0.05  # share of the diagonal by which two pieces of one bent conductor may overlap
-_MIN_SECOND_EDGE = 0.25  # share of a conductor's length where the weaker of its edges is seen
+_MIN_OVERLAP = 0.5  # share of the shorter edge that two edges of one conductor run side by side
+_RIM_STEP = 0.35  # share of the inner edges' step; what a camera's sharpening adds beside an edge is less
+_RIM_COHERENCE = 0.6  # share of the inner edges' coherence that a thick conductor's outer edges show at least
 
 
 @dataclass(frozen=True, slots=True)
 class Conductor:
-    """A straight thing that may be a conductor.
+    """A straight thin thing that may be a conductor.
 
-    `axis` is x1, y1, x2, y2 [px]; `width_px` is the distance of its two edges, None where only one was found; `reach`
-    is the share of the frame's chord along the axis that its edges cover, 0 to 1; `length_px` is how far apart its
-    outermost ends lie; `members` index the segments.
+    `axis` is x1, y1, x2, y2 [px]; `width_px` is the distance of its two edges; `reach` is the share of the frame's
+    chord along the axis that its edges cover, 0 to 1; `length_px` is how far apart its outermost ends lie; `coherence`
+    is that of its edges (EdgeLines), `contrast` [grey levels] how far its body stands out from the ground on both
+    sides; `edges` are its left and its right edge, directed as in EdgeLines.
     """
 
     axis: tuple[float, float, float, float]
-    width_px: float | None
+    edges: tuple[tuple[float, float, float, float], tuple[float, float, float, float]]
+    width_px: float
     reach: float
     length_px: float
-    members: tuple[int, ...]
+    coherence: float
+    contrast: float
 
     @property
     def angle_rad(self) -> float:
         """The axis' line angle [rad]."""
         return float(segment_angles_rad(np.array([self.axis]))[0])
+
+    @property
+    def support(self) -> float:
+        """The share of the frame's chord that is surely a conductor, 0 to 1."""
+        return self.coherence * self.reach
 
 
 def frame_chord_px(axis: tuple[float, float, float, float], shape: tuple[int, int]) -> float:
@@ -54,178 +64,154 @@ def frame_chord_px(axis: tuple[float, float, float, float], shape: tuple[int, in
     return max(high - low, length)
 
 
-def offset_px(conductor: Conductor, angle_rad: float, shape: tuple[int, int]) -> float:
-    """Where the conductor passes the image centre [px], abreast of it seen along `angle_rad` (LineEstimate.offset_px).
+@dataclass(frozen=True, slots=True, eq=False)  # arrays have no single answer to ==
+class _Pairs:
+    """Two edges each that may bound one conductor: all arrays (n,). `step` [grey levels] is the lower of the two."""
 
-    `shape` is the frame's (height, width).
-    """
-    x1, y1, x2, y2 = conductor.axis
-    along_x, along_y = math.sin(angle_rad), -math.cos(angle_rad)
-    from_x, from_y = x1 - (shape[1] - 1) / 2, y1 - (shape[0] - 1) / 2
-    advance = (x2 - x1) * along_x + (y2 - y1) * along_y
-    step = -(from_x * along_x + from_y * along_y) / advance
-    abreast_x, abreast_y = from_x + step * (x2 - x1), from_y + step * (y2 - y1)
-    return -abreast_x * along_y + abreast_y * along_x
-
-
-def middle_offset_px(conductors: list[Conductor], angle_rad: float, shape: tuple[int, int]) -> float:
-    """Offset [px] of the line halfway between the two outermost of `conductors`, at least one."""
-    offsets_px = [offset_px(conductor, angle_rad, shape) for conductor in conductors]
-    return 0.5 * (min(offsets_px) + max(offsets_px))
-
-
-def n_abreast(conductors: list[Conductor], angle_rad: float, shape: tuple[int, int]) -> int:
-    """The most conductors that a cut across the group meets, seen along `angle_rad`; `shape` is (height, width).
-
-    Two pieces one behind the other are one conductor, bent where a pole holds it; and what lies between another one's
-    edges, its bright middle, does not count.
-    """
-    distinct: list[tuple[float, float]] = []
-    spans: list[tuple[float, float]] = []
-    for conductor in sorted(conductors, key=lambda c: -(c.width_px or 0.0)):
-        place_px = offset_px(conductor, angle_rad, shape)
-        if any(abs(place_px - other_px) <= width_px / 2 for other_px, width_px in distinct):
-            continue
-        distinct.append((place_px, conductor.width_px or 0.0))
-        x1, y1, x2, y2 = conductor.axis
-        ends = (x * math.sin(angle_rad) - y * math.cos(angle_rad) for x, y in ((x1, y1), (x2, y2)))
-        low, high = sorted(ends)
-        spans.append((low, high))
-    # The fullest cut is among those just behind a span's start.
-    slack_px = _BEND_OVERLAP * math.hypot(*shape)
-    return max((sum(low <= start + slack_px <= high for low, high in spans) for start, _ in spans), default=0)
+    first: NDArray[np.int64]
+    second: NDArray[np.int64]
+    coherence: NDArray[np.float64]
+    step: NDArray[np.float64]
+    quality: NDArray[np.float64]
 
 
 def find_conductors(
-    lines: Segments,
-    covered_px: NDArray[np.float64],
-    shape: tuple[int, int],
-    max_width_px: float,
-    max_turn_rad: float,
+    edges: EdgeLines, grey: NDArray[np.uint8], max_width_px: float, max_turn_rad: float, min_coherence: float
 ) -> list[Conductor]:
-    """Pair the two edges of each conductor; an edge left over is a conductor of unknown width.
+    """Pair the edges of each conductor, the surest first; an edge belongs to one conductor at most.
 
-    `lines` is (n, 4) [px], longest first, directed with the brighter side on the right; `covered_px` (n,) [px] says how
-    much of each is supported by edges; `shape` is the frame's (height, width). Two edges pair when they run in opposite
-    directions within `max_turn_rad`, overlap by half of the shorter one and lie at most `max_width_px` apart. A pair
-    takes in what continues one of its edges, of either direction: a grey conductor is bright over dark ground and dark
-    over bright ground.
+    Two edges pair when they run in opposite directions within `max_turn_rad`, overlap by half of the shorter one, lie
+    at most `max_width_px` apart, and have the coherence `min_coherence` in the geometric mean. Two edges more that
+    enclose a pair make it wider when all between them is one body, else they make it two conductors side by side.
+    `grey` is the (h, w) uint8 image that the edges were found in.
     """
-    if len(lines) == 0:
-        return []
-    lengths_px = segment_lengths_px(lines)
-    directions = (lines[:, 2:] - lines[:, :2]) / lengths_px[:, None]
-    is_used = np.zeros(len(lines), dtype=bool)
-    pairs = []
-    for i in range(len(lines)):
-        if is_used[i]:
-            continue
-        partner, width_px = _nearest_opposite(i, lines, lengths_px, directions, is_used, max_width_px, max_turn_rad)
-        if partner is not None:
-            is_used[[i, partner]] = True
-            pairs.append((i, partner, width_px))
+    pairs = _opposite_pairs(edges, max_width_px, max_turn_rad, min_coherence)
+    is_used = np.zeros(len(edges.segments), dtype=bool)
     conductors = []
-    for i, partner, width_px in pairs:
-        axis = _middle(lines[i], lines[partner], directions[i], directions[partner])
-        pieces = [i, partner, *_pieces_along(axis, width_px / 2 + _ASIDE_PX, lines, is_used)]
-        is_used[pieces] = True
-        conductors.append(_as_conductor(axis, width_px, pieces, lines, covered_px / lengths_px, shape))
-    for i in np.flatnonzero(~is_used).tolist():
-        x1, y1, x2, y2 = lines[i].tolist()
-        conductors.append(_as_conductor((x1, y1, x2, y2), None, [i], lines, covered_px / lengths_px, shape))
+    for k in np.argsort(-pairs.quality, kind="stable").tolist():
+        if is_used[pairs.first[k]] or is_used[pairs.second[k]]:
+            continue
+        outer = _neighbours(k, pairs, is_used, edges)
+        bodies = [(int(pairs.first[k]), int(pairs.second[k]))]
+        if outer is not None:
+            # Four edges in a row: two conductors side by side, or a thick one with a bright middle.
+            left, right = outer
+            axis = _middle(edges.segments[left], edges.segments[right])
+            width_px = 2 * float(np.abs(_asides(edges.segments[[left]], axis))[0])
+            is_one = width_px <= max_width_px and not measure_profile(axis, width_px, max_width_px, grey).has_gap
+            first, second = bodies[0]
+            bodies = [(left, right)] if is_one else [(left, first), (second, right)]
+            is_used[[first, second]] = True
+        for i, j in bodies:
+            conductor = _conductor(i, j, edges, grey, max_width_px, may_grow=len(bodies) == 1)
+            is_used |= _lies_within(edges.segments, conductor.axis, conductor.width_px / 2 + 1.0)
+            is_used[[i, j]] = True
+            conductors.append(conductor)
     return conductors
 
 
-def _pieces_along(
-    axis: tuple[float, float, float, float], max_aside_px: float, lines: Segments, is_used: NDArray[np.bool_]
-) -> list[int]:
-    """The free lines with both ends within `max_aside_px` of the axis' infinite line."""
+def _conductor(
+    i: int, j: int, edges: EdgeLines, grey: NDArray[np.uint8], max_width_px: float, may_grow: bool
+) -> Conductor:
+    """The conductor that the edges `i` and `j` bound."""
+    axis = _middle(edges.segments[i], edges.segments[j])
+    i, j = sorted((i, j), key=lambda k: float(_asides(edges.segments[[k]], axis)[0]))  # left of the axis first
+    width_px = float(np.abs(_asides(edges.segments[[i, j]], axis)).sum())
+    profile = measure_profile(axis, width_px, max_width_px, grey)
+    left_px, right_px = profile.grows_left_px, profile.grows_right_px
+    if not may_grow or width_px + left_px + right_px > max_width_px:
+        left_px, right_px = 0.0, 0.0
+    covered_px = max(edges.covered_px[i], edges.covered_px[j])
+    return Conductor(
+        axis=_shifted(axis, axis, 0.5 * (right_px - left_px)),
+        edges=(
+            _shifted(tuple(edges.segments[i].tolist()), axis, -left_px),
+            _shifted(tuple(edges.segments[j].tolist()), axis, right_px),
+        ),
+        width_px=width_px + left_px + right_px,
+        reach=float(min(1.0, covered_px / frame_chord_px(axis, (grey.shape[0], grey.shape[1])))),
+        length_px=math.hypot(axis[2] - axis[0], axis[3] - axis[1]),
+        coherence=math.sqrt(edges.coherence[i] * edges.coherence[j]),
+        contrast=profile.contrast,
+    )
+
+
+def _shifted(
+    line: tuple[float, float, float, float], axis: tuple[float, float, float, float], right_px: float
+) -> tuple[float, float, float, float]:
+    """The line, moved to the right of the axis' direction."""
+    length = math.hypot(axis[2] - axis[0], axis[3] - axis[1])
+    x, y = -right_px * (axis[3] - axis[1]) / length, right_px * (axis[2] - axis[0]) / length
+    return line[0] + x, line[1] + y, line[2] + x, line[3] + y
+
+
+def _opposite_pairs(edges: EdgeLines, max_width_px: float, max_turn_rad: float, min_coherence: float) -> _Pairs:
+    """All pairs of edges that face each other."""
+    segments = edges.segments
+    lengths_px = segment_lengths_px(segments)
+    along = (segments[:, 2:] - segments[:, :2]) / lengths_px[:, None]
+    left, right = np.nonzero(np.triu(along @ along.T < -math.cos(max_turn_rad)))
+    dx, dy = along[left].T
+    from_x, from_y = (segments[right, :2] - segments[left, :2]).T
+    to_x, to_y = (segments[right, 2:] - segments[left, :2]).T
+    overlap_px = np.minimum(from_x * dx + from_y * dy, lengths_px[left]) - np.maximum(to_x * dx + to_y * dy, 0.0)
+    # The distance in the middle of what both share.
+    width_px = 0.5 * np.abs((from_x + to_x) * dy - (from_y + to_y) * dx)
+    coherence = np.sqrt(edges.coherence[left] * edges.coherence[right])
+    is_pair = (
+        (coherence >= min_coherence)
+        & (width_px <= max_width_px)
+        & (overlap_px >= _MIN_OVERLAP * np.minimum(lengths_px[left], lengths_px[right]))
+    )
+    left, right, overlap_px, width_px = left[is_pair], right[is_pair], overlap_px[is_pair], width_px[is_pair]
+    coherence = coherence[is_pair]
+    step = np.maximum(0.0, np.minimum(edges.step[left], edges.step[right]))
+    return _Pairs(
+        left, right, coherence, step, coherence * overlap_px * np.sqrt(step) * (1 - width_px / (2 * max_width_px))
+    )
+
+
+def _neighbours(k: int, pairs: _Pairs, is_used: NDArray[np.bool_], edges: EdgeLines) -> tuple[int, int] | None:
+    """The edges on both sides of pair `k` that pair with its edges as well as these do with each other, or None."""
+    first, second = int(pairs.first[k]), int(pairs.second[k])
+    axis = _middle(edges.segments[first], edges.segments[second])
+    asides_px = _asides(edges.segments, axis)
+    is_candidate = (pairs.step >= _RIM_STEP * pairs.step[k]) & (pairs.coherence >= _RIM_COHERENCE * pairs.coherence[k])
+    outer = []
+    for inner in (first, second):
+        is_mine = is_candidate & ((pairs.first == inner) | (pairs.second == inner))
+        others = np.where(pairs.first == inner, pairs.second, pairs.first)
+        is_outside = asides_px[others] * np.sign(asides_px[inner]) > abs(asides_px[inner]) + 0.5
+        found = np.flatnonzero(is_mine & is_outside & ~is_used[others])
+        if len(found) == 0:
+            return None
+        outer.append(int(others[found[np.argmax(pairs.quality[found])]]))
+    return outer[0], outer[1]
+
+
+def _asides(segments: NDArray[np.float64], axis: tuple[float, float, float, float]) -> NDArray[np.float64]:
+    """How far (n,) [px] the middles of (n, 4) segments lie right of the axis' infinite line."""
     x1, y1, x2, y2 = axis
     length = math.hypot(x2 - x1, y2 - y1)
     dx, dy = (x2 - x1) / length, (y2 - y1) / length
-    from_aside = np.abs((lines[:, 0] - x1) * dy - (lines[:, 1] - y1) * dx)
-    to_aside = np.abs((lines[:, 2] - x1) * dy - (lines[:, 3] - y1) * dx)
-    is_along: NDArray[np.bool_] = ~is_used & (np.maximum(from_aside, to_aside) <= max_aside_px)
-    return [int(i) for i in np.flatnonzero(is_along)]
+    mid_x, mid_y = 0.5 * (segments[:, 0] + segments[:, 2]) - x1, 0.5 * (segments[:, 1] + segments[:, 3]) - y1
+    return mid_y * dx - mid_x * dy
 
 
-def _as_conductor(
-    axis: tuple[float, float, float, float],
-    width_px: float | None,
-    pieces: list[int],
-    lines: Segments,
-    fill: NDArray[np.float64],
-    shape: tuple[int, int],
-) -> Conductor:
-    """A conductor from its edges' pieces: its reach is the union of their intervals, as far as they are filled.
-
-    A long edge beside which only some texture runs the other way is no conductor: its width is unknown, too.
-    """
-    x1, y1, x2, y2 = axis
-    length_px = math.hypot(x2 - x1, y2 - y1)
-    dx, dy = (x2 - x1) / length_px, (y2 - y1) / length_px
-    start = (lines[pieces, 0] - x1) * dx + (lines[pieces, 1] - y1) * dy
-    end = (lines[pieces, 2] - x1) * dx + (lines[pieces, 3] - y1) * dy
-    low, high = np.minimum(start, end), np.maximum(start, end)
-    is_forward = end > start
-    both_px = _union_px(low, high, fill[pieces])
-    side_px = min(
-        _union_px(low[is_side], high[is_side], fill[pieces][is_side]) for is_side in (is_forward, ~is_forward)
-    )
-    return Conductor(
-        axis=axis,
-        width_px=width_px if side_px >= _MIN_SECOND_EDGE * both_px else None,
-        reach=min(1.0, both_px / frame_chord_px(axis, shape)),
-        length_px=float(high.max() - low.min()),
-        members=tuple(pieces),
-    )
+def _lies_within(
+    segments: NDArray[np.float64], axis: tuple[float, float, float, float], max_aside_px: float
+) -> NDArray[np.bool_]:
+    """Which of (n, 4) segments have both ends within `max_aside_px` of the axis' infinite line."""
+    from_ends = _asides(segments[:, [0, 1, 0, 1]], axis)
+    to_ends = _asides(segments[:, [2, 3, 2, 3]], axis)
+    is_within: NDArray[np.bool_] = np.maximum(np.abs(from_ends), np.abs(to_ends)) <= max_aside_px
+    return is_within
 
 
-def _union_px(low: NDArray[np.float64], high: NDArray[np.float64], fill: NDArray[np.float64]) -> float:
-    """Length [px] of the union of intervals from `low` to `high` (n,) [px], each counted as far as it is filled."""
-    total_px, reached = 0.0, -math.inf
-    for i in np.argsort(low):
-        total_px += max(0.0, float(high[i]) - max(float(low[i]), reached)) * float(fill[i])
-        reached = max(reached, float(high[i]))
-    return total_px
-
-
-def _nearest_opposite(
-    i: int,
-    lines: Segments,
-    lengths_px: NDArray[np.float64],
-    directions: NDArray[np.float64],
-    is_used: NDArray[np.bool_],
-    max_width_px: float,
-    max_turn_rad: float,
-) -> tuple[int | None, float]:
-    """The free line that is the other edge of line `i`, and its distance [px]; None, and any number, without one."""
-    dx, dy = directions[i]
-    from_x, from_y = lines[:, 0] - lines[i, 0], lines[:, 1] - lines[i, 1]
-    to_x, to_y = lines[:, 2] - lines[i, 0], lines[:, 3] - lines[i, 1]
-    start, end = to_x * dx + to_y * dy, from_x * dx + from_y * dy  # an opposite line ends where it starts
-    overlap = np.minimum(end, lengths_px[i]) - np.maximum(start, 0.0)
-    aside = 0.5 * np.abs((from_x + to_x) * dy - (from_y + to_y) * dx)
-    is_other = (
-        ~is_used
-        & (directions @ directions[i] < -math.cos(max_turn_rad))
-        & (overlap >= 0.5 * np.minimum(lengths_px, lengths_px[i]))
-        & (aside <= max_width_px)
-    )
-    if not is_other.any():
-        return None, math.inf
-    j = int(np.argmin(np.where(is_other, aside, np.inf)))
-    return j, float(aside[j])
-
-
-def _middle(
-    first: NDArray[np.float64],
-    second: NDArray[np.float64],
-    first_direction: NDArray[np.float64],
-    second_direction: NDArray[np.float64],
-) -> tuple[float, float, float, float]:
-    """The middle line of two opposite edges, as long as both together reach."""
-    direction = first_direction - second_direction
+def _middle(first: NDArray[np.float64], second: NDArray[np.float64]) -> tuple[float, float, float, float]:
+    """The middle line of two opposite edges, (4,) each, as long as both together reach."""
+    direction = (first[2:] - first[:2]) / math.hypot(*(first[2:] - first[:2]))
+    direction = direction - (second[2:] - second[:2]) / math.hypot(*(second[2:] - second[:2]))
     direction /= math.hypot(direction[0], direction[1])
     points = np.array([first[:2], first[2:], second[:2], second[2:]])
     middle = points.mean(axis=0)

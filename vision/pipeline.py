@@ -2,16 +2,19 @@
 
 import math
 from dataclasses import dataclass
+from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from vision.cbs import find_segments
 from vision.circle import make_circle
-from vision.conductors import Conductor, find_conductors, middle_offset_px, n_abreast
+from vision.conductors import Conductor, find_conductors
+from vision.edge_lines import EdgeLines, ProjectionFinder, edge_lines
 from vision.edges import find_edges, to_grey
+from vision.line_group import choose_group, middle_offset_px, n_abreast
 from vision.linking import link_segments, segment_lengths_px
-from vision.orientation import line_angle_distance_rad, main_angle_rad, mean_line_angle_rad, segment_angles_rad
+from vision.orientation import main_angle_rad, mean_line_angle_rad, segment_angles_rad
 from vision.records import Detection, Segments
 
 
@@ -23,7 +26,9 @@ class VisionSettings:
     ValueError for a value that cannot work.
     """
 
-    # Edges (vision.edges.find_edges).
+    detector: Literal["projection", "cbs"] = "projection"
+
+    # Edges for the circle based search (vision.edges.find_edges).
     blur_sigma_px: float = 1.0
     edge_quantile: float = 0.96
     edge_low_ratio: float = 0.4
@@ -41,18 +46,28 @@ class VisionSettings:
     link_max_turn_rad: float = math.radians(3.0)
     link_max_aside_px: float = 2.5
     link_max_gap_share: float = 0.25
+    min_length_share: float = 0.09  # shorter lines are branches and joints
 
-    # Power lines: the lines of some length near the main angle, and which of them are thin (vision.conductors).
-    main_angle_tolerance_rad: float = math.radians(10.0)
-    min_length_share: float = 0.09
+    # Projection (vision.edge_lines.ProjectionFinder).
+    projection_min_coherence: float = 0.3
+    projection_min_length_share: float = 0.25
+    projection_min_contrast: float = 2.5  # grey levels per pixel of the shrunk image
+
+    # Conductors (vision.conductors.find_conductors).
     max_conductor_width_share: float = 0.03
     pair_max_turn_rad: float = math.radians(2.5)
-    min_counted_reach: float = 0.3  # share of the frame's chord
-    min_relative_reach: float = 0.35  # of the reach of the conductor that reaches furthest
+    min_coherence: float = 0.6
+    min_contrast: float = 8.0  # grey levels
 
-    # Presence: one thin conductor of this length that covers this share of the frame's chord along it.
-    presence_min_length_share: float = 0.25
-    presence_min_reach: float = 0.6
+    # The line group (vision.line_group.choose_group).
+    main_angle_tolerance_rad: float = math.radians(15.0)
+    min_relative_support: float = 0.7
+    min_relative_contrast: float = 0.35
+
+    # Presence: one conductor whose support is this share of the frame's chord along it, and this many times what
+    # texture adds up to along so many pixels: in a small image a line has to be surer than in a large one.
+    presence_min_support: float = 0.68
+    presence_min_sigmas: float = 10.5
 
     def __post_init__(self) -> None:
         if self.radius_step_px < 0 or self.radius_px - self.radius_step_px < 2:
@@ -62,19 +77,24 @@ class VisionSettings:
             )
         if self.skip_px < 1 or self.seed_grid_px < 1:
             raise ValueError("skip_px and seed_grid_px are steps in pixels: choose 1 or more.")
-        for name in ("edge_quantile", "edge_low_ratio", "min_fill", "min_walk_fill", "presence_min_reach"):
+        for name in ("edge_quantile", "edge_low_ratio", "min_fill", "min_walk_fill", "presence_min_support"):
             value = getattr(self, name)
             if not 0.0 < value <= 1.0:
                 raise ValueError(f"{name} is {value}, but it is a share: choose it above 0 and at most 1.")
 
 
 class LineFinder:
-    """Finds the power lines of one image after the other; keeps nothing from image to image."""
+    """Finds the power lines of one image after the other; remembers nothing that it saw."""
 
     def __init__(self, settings: VisionSettings) -> None:
         self._settings = settings
         radii_px = (settings.radius_px, settings.radius_px - settings.radius_step_px)
         self._circles = tuple(make_circle(radius_px) for radius_px in radii_px)
+        self._projection = ProjectionFinder(
+            settings.projection_min_coherence,
+            settings.projection_min_length_share,
+            settings.projection_min_contrast,
+        )
 
     def warm_up(self) -> None:
         """Compile every kernel, or load it from its cache, so that no frame in flight waits for the compiler."""
@@ -91,6 +111,33 @@ class LineFinder:
         grey = to_grey(image)
         shape = (grey.shape[0], grey.shape[1])
         diagonal_px = math.hypot(*shape)
+        edges = self._projection.find(grey) if settings.detector == "projection" else self._search(grey, diagonal_px)
+        conductors = find_conductors(
+            edges,
+            grey,
+            settings.max_conductor_width_share * diagonal_px,
+            settings.pair_max_turn_rad,
+            settings.min_coherence,
+        )
+        conductors = [c for c in conductors if c.contrast >= settings.min_contrast]
+        group, peak_rad = choose_group(
+            conductors,
+            settings.main_angle_tolerance_rad,
+            settings.min_relative_support,
+            settings.min_relative_contrast,
+        )
+        power_lines = np.array([edge for conductor in group for edge in conductor.edges]).reshape(-1, 4)
+        power_lines.setflags(write=False)
+        if peak_rad is None:
+            # Without a conductor the longest edges say which way the image runs.
+            weights = (edges.coherence * edges.covered_px) ** 2
+            peak_rad = main_angle_rad(segment_angles_rad(edges.segments), weights)
+            return Detection(edges.segments, power_lines, peak_rad, 0.0, 0, 0.0, False)
+        return self._judge(edges.segments, power_lines, group, shape)
+
+    def _search(self, grey: NDArray[np.uint8], diagonal_px: float) -> EdgeLines:
+        """Find edge lines by the circle based search and linking."""
+        settings = self._settings
         codes = find_edges(
             grey,
             settings.blur_sigma_px,
@@ -112,61 +159,33 @@ class LineFinder:
             settings.link_max_aside_px,
             settings.link_max_gap_share * diagonal_px,
         )
-        angles_rad = segment_angles_rad(lines)
-        # The square of the length: one line across the frame outweighs a meadow's many short pieces.
-        peak_rad = main_angle_rad(angles_rad, covered_px**2)
-        if peak_rad is None:
-            return Detection(segments, segments, None, 0.0, 0, 0.0, False)
-        is_chosen = (line_angle_distance_rad(angles_rad, peak_rad) <= settings.main_angle_tolerance_rad) & (
-            segment_lengths_px(lines) >= settings.min_length_share * diagonal_px
-        )
-        power_lines: Segments = lines[is_chosen]
-        power_lines.setflags(write=False)
-        conductors = find_conductors(
-            power_lines,
-            covered_px[is_chosen],
-            shape,
-            settings.max_conductor_width_share * diagonal_px,
-            settings.pair_max_turn_rad,
-        )
-        # Conductors cross the frame side by side: beside one that does, a short line is a branch or a joint.
-        best_reach = max((c.reach for c in conductors), default=0.0)
-        conductors = [c for c in conductors if c.reach >= settings.min_relative_reach * best_reach]
-        power_lines = power_lines[sorted(member for c in conductors for member in c.members)]
-        power_lines.setflags(write=False)
-        return self._judge(segments, power_lines, conductors, peak_rad, shape, diagonal_px)
+        is_long = segment_lengths_px(lines) >= settings.min_length_share * diagonal_px
+        return edge_lines(grey, lines[is_long], covered_px[is_long])
 
     def _judge(
         self,
         segments: Segments,
         power_lines: Segments,
-        conductors: list[Conductor],
-        peak_rad: float,
+        group: list[Conductor],
         shape: tuple[int, int],
-        diagonal_px: float,
     ) -> Detection:
         """Say from the conductors whether there is a power line, and where its middle runs."""
         settings = self._settings
-        thin = [c for c in conductors if c.width_px is not None and c.reach >= settings.min_counted_reach]
         is_present = any(
-            c.reach >= settings.presence_min_reach and c.length_px >= settings.presence_min_length_share * diagonal_px
-            for c in thin
+            c.support >= max(settings.presence_min_support, settings.presence_min_sigmas / math.sqrt(c.length_px))
+            for c in group
         )
-        group = thin or conductors
-        if not group:
-            return Detection(segments, power_lines, peak_rad, 0.0, 0, 0.0, False)
         angle_rad = mean_line_angle_rad(
             np.array([c.angle_rad for c in group]), np.array([c.length_px**2 for c in group])
         )
-        n_lines = n_abreast(thin, angle_rad, shape)
-        # Each thin conductor is a witness, and it is wrong with the share of the frame that it does not cover.
-        confidence = 1.0 - math.prod(1.0 - c.reach for c in thin)
+        # Each conductor is a witness, and it is wrong with the share of the frame that it does not surely cover.
+        confidence = 1.0 - math.prod(1.0 - c.support for c in group)
         return Detection(
             segments,
             power_lines,
             angle_rad,
             middle_offset_px(group, angle_rad, shape),
-            n_lines,
-            confidence if is_present else min(confidence, settings.presence_min_reach),
+            n_abreast(group, angle_rad, shape),
+            confidence if is_present else min(confidence, settings.presence_min_support),
             is_present,
         )
