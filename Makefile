@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 MISSION ?= missions/follow_line.yaml
 FLY ?= --speed 1.5
 
-.PHONY: fly test check bench schema clean
+.PHONY: fly test check bench bench-vision schema clean
 
 fly: $(VENV)/.installed
 	$(BIN)/lineflight dry-run $(MISSION) $(FLY)
@@ -20,7 +20,10 @@ check: $(VENV)/.installed-dev
 	$(BIN)/lint-imports
 
 bench: $(VENV)/.installed-dev
-	$(BIN)/python benchmarks/flights.py
+	$(BIN)/python -m benchmarks.flights
+
+bench-vision: $(VENV)/.installed-dev
+	$(BIN)/python -m benchmarks.vision $(if $(DATA),--data $(DATA))
 
 schema: $(VENV)/.installed
 	$(BIN)/python -c "from mission.plan_file import schema_text; print(schema_text(), end='')" > missions/mission.schema.json

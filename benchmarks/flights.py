@@ -1,6 +1,6 @@
 """Fly follow_line over seeds and winds, and write what came out to docs/benchmarks.md.
 
-    python benchmarks/flights.py [--speed K] [--seeds N] [--wind M_S ...] [--out FILE]
+    python -m benchmarks.flights [--speed K] [--seeds N] [--wind M_S ...] [--out FILE]
 
 Each flight is a whole `lineflight dry-run`: simulated vehicle, rendered world, vision worker, MAVSDK over UDP. Flights
 run one after the other, because two cores hold one flight and its renderer.
@@ -16,12 +16,12 @@ import time
 from pathlib import Path
 from typing import Any
 
+from benchmarks.page import PAGE, write_section
+
 ROOT = Path(__file__).parents[1]
 MISSION = ROOT / "missions" / "follow_line.yaml"
 HEADER = """\
-# Benchmarks
-
-`make bench` regenerates this page. Every row is a whole dry-run of `missions/follow_line.yaml` in the world
+`make bench` regenerates this section. Every row is a whole dry-run of `missions/follow_line.yaml` in the world
 `medium_voltage`, flown by MAVSDK over UDP with vision in the loop, at {speed:g} times real time. Wind is the mean at
 20 ft; Dryden gusts come with it. Straightness is [Ceron] equations 6.3 to 6.5 (the thesis flew 0.04 to 0.22 m). The
 distance from the line and the heading error are against the simulated truth, the landing against the take-off point.
@@ -100,7 +100,7 @@ def main() -> None:
     parser.add_argument("--speed", type=float, default=2.0)
     parser.add_argument("--seeds", type=int, default=5)
     parser.add_argument("--wind", type=float, nargs="+", default=[0.0, 4.0, 8.0])
-    parser.add_argument("--out", type=Path, default=ROOT / "docs" / "benchmarks.md")
+    parser.add_argument("--out", type=Path, default=PAGE)
     options = parser.parse_args()
     flights: list[tuple[float, dict[str, Any]]] = []
     rows = []
@@ -114,8 +114,7 @@ def main() -> None:
                 print(f"{rows[-1]}  {time.monotonic() - begin_s:.0f} s wall", flush=True)
                 table = ["| " + " | ".join(COLUMNS) + " |", "|" + " --- |" * len(COLUMNS), *rows]
                 text = "\n".join([HEADER.format(speed=options.speed), summary(flights), "", *table, ""])
-                options.out.parent.mkdir(parents=True, exist_ok=True)
-                options.out.write_text(text, encoding="utf-8")
+                write_section("Flights", text, options.out)
     print(summary(flights))
 
 

@@ -18,6 +18,7 @@ from vision.profile import measure_profile
 
 _MIN_OVERLAP = 0.5  # share of the shorter edge that two edges of one conductor run side by side
 _RIM_STEP = 0.35  # share of the inner edges' step; what a camera's sharpening adds beside an edge is less
+_MIN_NEIGHBOUR_CONTRAST = 0.7  # share of the contrast between two conductors that they have themselves
 _RIM_COHERENCE = 0.6  # share of the inner edges' coherence that a thick conductor's outer edges show at least
 
 
@@ -28,7 +29,8 @@ class Conductor:
     `axis` is x1, y1, x2, y2 [px]; `width_px` is the distance of its two edges; `reach` is the share of the frame's
     chord along the axis that its edges cover, 0 to 1; `length_px` is how far apart its outermost ends lie; `coherence`
     is that of its edges (EdgeLines), `contrast` [grey levels] how far its body stands out from the ground on both
-    sides; `edges` are its left and its right edge, directed as in EdgeLines.
+    sides; `edges` are its left and its right edge, directed as in EdgeLines. `has_gap` says that columns of its
+    body look like the ground (vision.profile); `members` index the edges that it was made of.
     """
 
     axis: tuple[float, float, float, float]
@@ -38,6 +40,8 @@ class Conductor:
     length_px: float
     coherence: float
     contrast: float
+    has_gap: bool
+    members: tuple[int, int]
 
     @property
     def angle_rad(self) -> float:
@@ -87,31 +91,50 @@ def find_conductors(
     """
     pairs = _opposite_pairs(edges, max_width_px, max_turn_rad, min_coherence)
     is_used = np.zeros(len(edges.segments), dtype=bool)
-    conductors = []
+    conductors: list[Conductor] = []
     for k in np.argsort(-pairs.quality, kind="stable").tolist():
         if is_used[pairs.first[k]] or is_used[pairs.second[k]]:
             continue
         outer = _neighbours(k, pairs, is_used, edges)
-        bodies = [(int(pairs.first[k]), int(pairs.second[k]))]
+        first, second = int(pairs.first[k]), int(pairs.second[k])
+        found = [_conductor(first, second, edges, grey, max_width_px)]
         if outer is not None:
-            # Four edges in a row: two conductors side by side, or a thick one with a bright middle.
-            left, right = outer
-            axis = _middle(edges.segments[left], edges.segments[right])
-            width_px = 2 * float(np.abs(_asides(edges.segments[[left]], axis))[0])
-            is_one = width_px <= max_width_px and not measure_profile(axis, width_px, max_width_px, grey).has_gap
-            first, second = bodies[0]
-            bodies = [(left, right)] if is_one else [(left, first), (second, right)]
+            found = _four_edges(found[0], (outer[0], first, second, outer[1]), edges, grey, max_width_px)
             is_used[[first, second]] = True
-        for i, j in bodies:
-            conductor = _conductor(i, j, edges, grey, max_width_px, may_grow=len(bodies) == 1)
+        # Around a conductor that is found already lie the edges that the camera's sharpening drew: no second one.
+        axes = np.array([conductor.axis for conductor in conductors]).reshape(-1, 4)
+        found = [conductor for conductor in found if not _is_around_any(conductor, axes)]
+        for conductor in found:
             is_used |= _lies_within(edges.segments, conductor.axis, conductor.width_px / 2 + 1.0)
-            is_used[[i, j]] = True
-            conductors.append(conductor)
+            is_used[list(conductor.members)] = True
+        conductors += found
     return conductors
 
 
+def _is_around_any(conductor: Conductor, axes: NDArray[np.float64]) -> bool:
+    """Whether any of the axes (n, 4) runs inside the conductor."""
+    return bool(_lies_within(axes, conductor.axis, conductor.width_px / 2).any())
+
+
+def _four_edges(
+    inner: Conductor, row: tuple[int, int, int, int], edges: EdgeLines, grey: NDArray[np.uint8], max_width_px: float
+) -> list[Conductor]:
+    """What four edges in a row are: a thick conductor with a bright middle, two side by side, or the inner one alone.
+
+    The inner one is alone when its neighbours stand out much less: a camera's sharpening draws such edges.
+    """
+    left, first, second, right = row
+    outer = _conductor(left, right, edges, grey, max_width_px)
+    beside = [_conductor(i, j, edges, grey, max_width_px, may_grow=False) for i, j in ((left, first), (second, right))]
+    if outer.width_px <= max_width_px and not outer.has_gap:
+        return [outer]
+    if min(conductor.contrast for conductor in beside) >= _MIN_NEIGHBOUR_CONTRAST * inner.contrast:
+        return beside
+    return [inner]
+
+
 def _conductor(
-    i: int, j: int, edges: EdgeLines, grey: NDArray[np.uint8], max_width_px: float, may_grow: bool
+    i: int, j: int, edges: EdgeLines, grey: NDArray[np.uint8], max_width_px: float, may_grow: bool = True
 ) -> Conductor:
     """The conductor that the edges `i` and `j` bound."""
     axis = _middle(edges.segments[i], edges.segments[j])
@@ -133,6 +156,8 @@ def _conductor(
         length_px=math.hypot(axis[2] - axis[0], axis[3] - axis[1]),
         coherence=math.sqrt(edges.coherence[i] * edges.coherence[j]),
         contrast=profile.contrast,
+        has_gap=profile.has_gap,
+        members=(i, j),
     )
 
 

@@ -1,21 +1,21 @@
 """The line finder: from an image to the power lines it shows and the line group's angle and offset."""
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from vision.cbs import find_segments
-from vision.circle import make_circle
 from vision.conductors import Conductor, find_conductors
-from vision.edge_lines import EdgeLines, ProjectionFinder, edge_lines
-from vision.edges import find_edges, to_grey
+from vision.edge_lines import ProjectionFinder, ProjectionSettings
+from vision.edges import to_grey
+from vision.finders import BaselineFinder, CbsFinder, CbsSettings, EdgeLineFinder, EdgeSettings, LinkSettings
 from vision.line_group import choose_group, middle_offset_px, n_abreast
-from vision.linking import link_segments, segment_lengths_px
 from vision.orientation import main_angle_rad, mean_line_angle_rad, segment_angles_rad
 from vision.records import Detection, Segments
+
+Detector = Literal["projection", "cbs", "hough", "lsd", "edlines"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,32 +26,11 @@ class VisionSettings:
     ValueError for a value that cannot work.
     """
 
-    detector: Literal["projection", "cbs"] = "projection"
-
-    # Edges for the circle based search (vision.edges.find_edges).
-    blur_sigma_px: float = 1.0
-    edge_quantile: float = 0.96
-    edge_low_ratio: float = 0.4
-    edge_min_contrast: float = 2.0  # grey levels per pixel
-
-    # Circle based search (vision.cbs.find_segments).
-    radius_px: int = 11
-    radius_step_px: int = 4  # the second pass' circle is smaller by this
-    min_fill: float = 0.9
-    min_walk_fill: float = 0.6
-    skip_px: int = 11
-    seed_grid_px: int = 6
-
-    # Linking (vision.linking.link_segments).
-    link_max_turn_rad: float = math.radians(3.0)
-    link_max_aside_px: float = 2.5
-    link_max_gap_share: float = 0.25
-    min_length_share: float = 0.09  # shorter lines are branches and joints
-
-    # Projection (vision.edge_lines.ProjectionFinder).
-    projection_min_coherence: float = 0.3
-    projection_min_length_share: float = 0.25
-    projection_min_contrast: float = 2.5  # grey levels per pixel of the shrunk image
+    detector: Detector = "projection"
+    projection: ProjectionSettings = field(default_factory=ProjectionSettings)
+    edges: EdgeSettings = field(default_factory=EdgeSettings)
+    search: CbsSettings = field(default_factory=CbsSettings)
+    linking: LinkSettings = field(default_factory=LinkSettings)
 
     # Conductors (vision.conductors.find_conductors).
     max_conductor_width_share: float = 0.03
@@ -69,18 +48,14 @@ class VisionSettings:
     presence_min_support: float = 0.68
     presence_min_sigmas: float = 10.5
 
-    def __post_init__(self) -> None:
-        if self.radius_step_px < 0 or self.radius_px - self.radius_step_px < 2:
-            raise ValueError(
-                f"radius_px {self.radius_px} less radius_step_px {self.radius_step_px} leaves no search circle: "
-                "choose them so that both passes have a radius of 2 px or more."
-            )
-        if self.skip_px < 1 or self.seed_grid_px < 1:
-            raise ValueError("skip_px and seed_grid_px are steps in pixels: choose 1 or more.")
-        for name in ("edge_quantile", "edge_low_ratio", "min_fill", "min_walk_fill", "presence_min_support"):
-            value = getattr(self, name)
-            if not 0.0 < value <= 1.0:
-                raise ValueError(f"{name} is {value}, but it is a share: choose it above 0 and at most 1.")
+
+def make_edge_finder(settings: VisionSettings) -> EdgeLineFinder:
+    """The finder that the settings name."""
+    if settings.detector == "projection":
+        return ProjectionFinder(settings.projection)
+    if settings.detector == "cbs":
+        return CbsFinder(settings.edges, settings.search, settings.linking)
+    return BaselineFinder(settings.detector, settings.edges, settings.linking)
 
 
 class LineFinder:
@@ -88,13 +63,7 @@ class LineFinder:
 
     def __init__(self, settings: VisionSettings) -> None:
         self._settings = settings
-        radii_px = (settings.radius_px, settings.radius_px - settings.radius_step_px)
-        self._circles = tuple(make_circle(radius_px) for radius_px in radii_px)
-        self._projection = ProjectionFinder(
-            settings.projection_min_coherence,
-            settings.projection_min_length_share,
-            settings.projection_min_contrast,
-        )
+        self._edge_finder = make_edge_finder(settings)
 
     def warm_up(self) -> None:
         """Compile every kernel, or load it from its cache, so that no frame in flight waits for the compiler."""
@@ -111,7 +80,7 @@ class LineFinder:
         grey = to_grey(image)
         shape = (grey.shape[0], grey.shape[1])
         diagonal_px = math.hypot(*shape)
-        edges = self._projection.find(grey) if settings.detector == "projection" else self._search(grey, diagonal_px)
+        edges = self._edge_finder.find(grey)
         conductors = find_conductors(
             edges,
             grey,
@@ -134,33 +103,6 @@ class LineFinder:
             peak_rad = main_angle_rad(segment_angles_rad(edges.segments), weights)
             return Detection(edges.segments, power_lines, peak_rad, 0.0, 0, 0.0, False)
         return self._judge(edges.segments, power_lines, group, shape)
-
-    def _search(self, grey: NDArray[np.uint8], diagonal_px: float) -> EdgeLines:
-        """Find edge lines by the circle based search and linking."""
-        settings = self._settings
-        codes = find_edges(
-            grey,
-            settings.blur_sigma_px,
-            settings.edge_quantile,
-            settings.edge_low_ratio,
-            settings.edge_min_contrast,
-        )
-        segments = find_segments(
-            codes,
-            self._circles,
-            settings.min_fill,
-            settings.min_walk_fill,
-            settings.skip_px,
-            settings.seed_grid_px,
-        )
-        lines, covered_px = link_segments(
-            segments,
-            settings.link_max_turn_rad,
-            settings.link_max_aside_px,
-            settings.link_max_gap_share * diagonal_px,
-        )
-        is_long = segment_lengths_px(lines) >= settings.min_length_share * diagonal_px
-        return edge_lines(grey, lines[is_long], covered_px[is_long])
 
     def _judge(
         self,

@@ -10,8 +10,9 @@ from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
 
 from tests.vision.nadir_frames import draw_line, expose, ground, nadir_frame
+from vision.finders import CbsSettings
 from vision.orientation import line_angle_distance_rad
-from vision.pipeline import LineFinder, VisionSettings
+from vision.pipeline import Detector, LineFinder, VisionSettings
 from vision.records import Detection, wrap_line_angle_rad
 
 
@@ -217,6 +218,20 @@ def test_colour_and_grey_agree(finder: LineFinder) -> None:
     assert finder.find(frame).estimate(5) == finder.find(np.repeat(frame[:, :, None], 3, axis=2)).estimate(5)
 
 
+@pytest.mark.parametrize("detector", ["projection", "cbs", "hough", "lsd", "edlines"])
+def test_every_detector_finds_a_plain_line_and_answers_anything(detector: Detector) -> None:
+    finder = LineFinder(VisionSettings(detector=detector))
+    frame = expose(draw_line(draw_line(np.full((480, 640), 90.0), 0.4, 40.0, 5.0, 220.0), 0.4, 90.0, 5.0, 220.0), 1)
+    detection = finder.find(frame)
+    assert is_honest(detection)
+    assert detection.is_present
+    assert detection.n_lines == 2
+    assert angle_error_deg(detection, 0.4) < 0.3
+    assert detection.offset_px == pytest.approx(65.0, abs=1.5)
+    for size in ((1, 1), (7, 90), (40, 30)):
+        assert is_honest(finder.find(np.random.default_rng(1).integers(0, 256, size, dtype=np.uint8)))
+
+
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [
@@ -224,9 +239,9 @@ def test_colour_and_grey_agree(finder: LineFinder) -> None:
         ({"skip_px": 0}, "skip_px"),
         ({"seed_grid_px": 0}, "seed_grid_px"),
         ({"min_fill": 0.0}, "min_fill is 0.0"),
-        ({"edge_quantile": 1.5}, "edge_quantile is 1.5"),
+        ({"min_walk_fill": 1.5}, "min_walk_fill is 1.5"),
     ],
 )
-def test_settings_that_cannot_work_are_refused(wrong: dict[str, float], words: str) -> None:
+def test_settings_that_cannot_work_are_refused(wrong: dict[str, int], words: str) -> None:
     with pytest.raises(ValueError, match=words):
-        VisionSettings(**wrong)  # type: ignore[arg-type]
+        CbsSettings(**wrong)

@@ -16,7 +16,7 @@ Axis = tuple[float, float, float, float]
 
 def conductor(axis: Axis, coherence: float = 0.9, reach: float = 1.0, contrast: float = 80.0) -> Conductor:
     length_px = math.hypot(axis[2] - axis[0], axis[3] - axis[1])
-    return Conductor(axis, (axis, axis), 2.0, reach, length_px, coherence, contrast)
+    return Conductor(axis, (axis, axis), 2.0, reach, length_px, coherence, contrast, False, (0, 1))
 
 
 def upright(x: float, lean: float = 0.0) -> Axis:

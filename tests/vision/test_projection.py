@@ -10,10 +10,12 @@ from hypothesis.extra.numpy import arrays
 
 from tests.vision.nadir_frames import draw_line, expose, ground
 from vision import edge_lines, gradient, projection
-from vision.edge_lines import ProjectionFinder, find_peaks, keep_distinct, line_lengths, refine
+from vision.edge_lines import ProjectionFinder, ProjectionSettings
 from vision.gradient import UNIT, unit_gradient
 from vision.orientation import line_angle_distance_rad, segment_angles_rad
+from vision.peaks import find_peaks, line_lengths
 from vision.projection import project
+from vision.refinement import keep_distinct, refine
 
 
 def projected(field: np.ndarray) -> np.ndarray:
@@ -73,7 +75,7 @@ def test_the_unit_gradient_knows_the_way_and_not_the_strength() -> None:
 
 @pytest.mark.parametrize("shape", [(1, 1), (1, 500), (500, 1), (2, 2), (3, 300), (31, 31), (261, 33)])
 def test_small_images_have_no_lines_or_honest_ones(shape: tuple[int, int]) -> None:
-    found = ProjectionFinder(0.3, 0.25, 2.5).find(np.zeros(shape, dtype=np.uint8))
+    found = ProjectionFinder(ProjectionSettings()).find(np.zeros(shape, dtype=np.uint8))
     assert found.segments.shape == (0, 4)
 
 
@@ -82,7 +84,7 @@ def test_small_images_have_no_lines_or_honest_ones(shape: tuple[int, int]) -> No
 def test_both_edges_of_a_drawn_line_are_found(angle_deg: float, offset_px: float, level: float) -> None:
     angle_rad = math.radians(angle_deg)
     image = expose(draw_line(ground(1, 12.0), angle_rad, offset_px, 6.0, level), 2)
-    found = ProjectionFinder(0.3, 0.25, 2.5).find(image)
+    found = ProjectionFinder(ProjectionSettings()).find(image)
     segments = found.segments[:2]
     assert np.degrees(line_angle_distance_rad(segment_angles_rad(segments), angle_rad)).max() < 0.5
     middle_x, middle_y = segments[:, [0, 2]].mean(axis=1) - 319.5, segments[:, [1, 3]].mean(axis=1) - 239.5
