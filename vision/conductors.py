@@ -22,6 +22,10 @@ _MIN_NEIGHBOUR_CONTRAST = 0.7  # share of the contrast between two conductors th
 _RIM_COHERENCE = 0.6  # share of the inner edges' coherence that a thick conductor's outer edges show at least
 
 
+Line = tuple[float, float, float, float]
+"""x1, y1, x2, y2 [px]."""
+
+
 @dataclass(frozen=True, slots=True)
 class Conductor:
     """A straight thin thing that may be a conductor.
@@ -33,8 +37,8 @@ class Conductor:
     body look like the ground (vision.profile); `members` index the edges that it was made of.
     """
 
-    axis: tuple[float, float, float, float]
-    edges: tuple[tuple[float, float, float, float], tuple[float, float, float, float]]
+    axis: Line
+    edges: tuple[Line, Line]
     width_px: float
     reach: float
     length_px: float
@@ -54,7 +58,7 @@ class Conductor:
         return self.coherence * self.reach
 
 
-def frame_chord_px(axis: tuple[float, float, float, float], shape: tuple[int, int]) -> float:
+def frame_chord_px(axis: Line, shape: tuple[int, int]) -> float:
     """Length [px] of the part of the axis' infinite line inside a frame of `shape` (height, width)."""
     x1, y1, x2, y2 = axis
     length = math.hypot(x2 - x1, y2 - y1)
@@ -137,9 +141,11 @@ def _conductor(
     i: int, j: int, edges: EdgeLines, grey: NDArray[np.uint8], max_width_px: float, may_grow: bool = True
 ) -> Conductor:
     """The conductor that the edges `i` and `j` bound."""
-    axis = _middle(edges.segments[i], edges.segments[j])
-    i, j = sorted((i, j), key=lambda k: float(_asides(edges.segments[[k]], axis)[0]))  # left of the axis first
-    width_px = float(np.abs(_asides(edges.segments[[i, j]], axis)).sum())
+    one, other = _as_line(edges.segments[i]), _as_line(edges.segments[j])
+    axis = _middle(one, other)
+    if _aside_px(one, axis) > 0:  # the left edge first
+        i, j, one, other = j, i, other, one
+    width_px = _aside_px(other, axis) - _aside_px(one, axis)
     profile = measure_profile(axis, width_px, max_width_px, grey)
     left_px, right_px = profile.grows_left_px, profile.grows_right_px
     if not may_grow or width_px + left_px + right_px > max_width_px:
@@ -148,8 +154,8 @@ def _conductor(
     return Conductor(
         axis=_shifted(axis, axis, 0.5 * (right_px - left_px)),
         edges=(
-            _shifted(tuple(edges.segments[i].tolist()), axis, -left_px),
-            _shifted(tuple(edges.segments[j].tolist()), axis, right_px),
+            _shifted(one, axis, -left_px),
+            _shifted(other, axis, right_px),
         ),
         width_px=width_px + left_px + right_px,
         reach=float(min(1.0, covered_px / frame_chord_px(axis, (grey.shape[0], grey.shape[1])))),
@@ -161,9 +167,7 @@ def _conductor(
     )
 
 
-def _shifted(
-    line: tuple[float, float, float, float], axis: tuple[float, float, float, float], right_px: float
-) -> tuple[float, float, float, float]:
+def _shifted(line: Line, axis: Line, right_px: float) -> Line:
     """The line, moved to the right of the axis' direction."""
     length = math.hypot(axis[2] - axis[0], axis[3] - axis[1])
     x, y = -right_px * (axis[3] - axis[1]) / length, right_px * (axis[2] - axis[0]) / length
@@ -199,7 +203,7 @@ def _opposite_pairs(edges: EdgeLines, max_width_px: float, max_turn_rad: float, 
 def _neighbours(k: int, pairs: _Pairs, is_used: NDArray[np.bool_], edges: EdgeLines) -> tuple[int, int] | None:
     """The edges on both sides of pair `k` that pair with its edges as well as these do with each other, or None."""
     first, second = int(pairs.first[k]), int(pairs.second[k])
-    axis = _middle(edges.segments[first], edges.segments[second])
+    axis = _middle(_as_line(edges.segments[first]), _as_line(edges.segments[second]))
     asides_px = _asides(edges.segments, axis)
     is_candidate = (pairs.step >= _RIM_STEP * pairs.step[k]) & (pairs.coherence >= _RIM_COHERENCE * pairs.coherence[k])
     outer = []
@@ -214,7 +218,7 @@ def _neighbours(k: int, pairs: _Pairs, is_used: NDArray[np.bool_], edges: EdgeLi
     return outer[0], outer[1]
 
 
-def _asides(segments: NDArray[np.float64], axis: tuple[float, float, float, float]) -> NDArray[np.float64]:
+def _asides(segments: NDArray[np.float64], axis: Line) -> NDArray[np.float64]:
     """How far (n,) [px] the middles of (n, 4) segments lie right of the axis' infinite line."""
     x1, y1, x2, y2 = axis
     length = math.hypot(x2 - x1, y2 - y1)
@@ -223,9 +227,7 @@ def _asides(segments: NDArray[np.float64], axis: tuple[float, float, float, floa
     return mid_y * dx - mid_x * dy
 
 
-def _lies_within(
-    segments: NDArray[np.float64], axis: tuple[float, float, float, float], max_aside_px: float
-) -> NDArray[np.bool_]:
+def _lies_within(segments: NDArray[np.float64], axis: Line, max_aside_px: float) -> NDArray[np.bool_]:
     """Which of (n, 4) segments have both ends within `max_aside_px` of the axis' infinite line."""
     from_ends = _asides(segments[:, [0, 1, 0, 1]], axis)
     to_ends = _asides(segments[:, [2, 3, 2, 3]], axis)
@@ -233,13 +235,30 @@ def _lies_within(
     return is_within
 
 
-def _middle(first: NDArray[np.float64], second: NDArray[np.float64]) -> tuple[float, float, float, float]:
-    """The middle line of two opposite edges, (4,) each, as long as both together reach."""
-    direction = (first[2:] - first[:2]) / math.hypot(*(first[2:] - first[:2]))
-    direction = direction - (second[2:] - second[:2]) / math.hypot(*(second[2:] - second[:2]))
-    direction /= math.hypot(direction[0], direction[1])
-    points = np.array([first[:2], first[2:], second[:2], second[2:]])
-    middle = points.mean(axis=0)
-    along = (points - middle) @ direction
-    tail, head = middle + along.min() * direction, middle + along.max() * direction
-    return float(tail[0]), float(tail[1]), float(head[0]), float(head[1])
+def _as_line(segment: NDArray[np.float64]) -> Line:
+    """A segment (4,) as plain numbers."""
+    x1, y1, x2, y2 = segment.tolist()
+    return x1, y1, x2, y2
+
+
+def _middle(first: Line, second: Line) -> Line:
+    """The middle line of two opposite edges, as long as both together reach, along the first."""
+    first_px = math.hypot(first[2] - first[0], first[3] - first[1])
+    second_px = math.hypot(second[2] - second[0], second[3] - second[1])
+    dx = (first[2] - first[0]) / first_px - (second[2] - second[0]) / second_px
+    dy = (first[3] - first[1]) / first_px - (second[3] - second[1]) / second_px
+    length = math.hypot(dx, dy)
+    dx, dy = dx / length, dy / length
+    x = 0.25 * (first[0] + first[2] + second[0] + second[2])
+    y = 0.25 * (first[1] + first[3] + second[1] + second[3])
+    ends = (first[:2], first[2:], second[:2], second[2:])
+    along = [(end[0] - x) * dx + (end[1] - y) * dy for end in ends]
+    tail, head = min(along), max(along)
+    return x + tail * dx, y + tail * dy, x + head * dx, y + head * dy
+
+
+def _aside_px(line: Line, axis: Line) -> float:
+    """How far the middle of a line lies right of the axis' infinite line."""
+    dx, dy = axis[2] - axis[0], axis[3] - axis[1]
+    mid_x, mid_y = 0.5 * (line[0] + line[2]) - axis[0], 0.5 * (line[1] + line[3]) - axis[1]
+    return (mid_y * dx - mid_x * dy) / math.hypot(dx, dy)

@@ -19,7 +19,7 @@ from vision.refinement import BLOCK, keep_distinct, refine
 
 _NORMAL_X, _NORMAL_Y = math.cos(math.pi / 8), math.sin(math.pi / 8)  # of the middle line of an octant
 _MAX_PEAKS = 4096
-_MAX_LINES = 48  # of each octant
+_MAX_LINES = 32  # of each octant
 _STEP_ASIDE_PX = 1.0  # of the shrunk image
 _STEP_SPACING_PX = 3.0  # along the edge
 _MERGE_ASIDE_PX = 1.5  # of the shrunk image: two findings of one edge lie this close at one end and in the middle
