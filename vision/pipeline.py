@@ -67,9 +67,14 @@ class LineFinder:
 
     def warm_up(self) -> None:
         """Compile every kernel, or load it from its cache, so that no frame in flight waits for the compiler."""
-        image = np.full((96, 96, 3), 60, dtype=np.uint8)
-        image[:, 40:43] = 220
-        self.find(image)
+        colour = np.full((96, 96, 3), 60, dtype=np.uint8)
+        colour[:, 40:43] = 220
+        grey = np.ascontiguousarray(colour[:, :, 0])
+        # To the compiler an array that must not be written to is another type, and cameras give those.
+        locked = grey.copy()
+        locked.setflags(write=False)
+        for image in (colour, grey, locked):
+            self.find(image)
 
     def find(self, image: NDArray[np.uint8]) -> Detection:
         """Find the power lines in `image`, (h, w) grey or (h, w, 3) BGR uint8, of any size from 1x1 on.

@@ -1,6 +1,8 @@
 """The line finder: angle, offset, number and presence on drawn nadir frames; honest on whatever else it is shown."""
 
 import math
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -230,6 +232,16 @@ def test_every_detector_finds_a_plain_line_and_answers_anything(detector: Detect
     assert detection.offset_px == pytest.approx(65.0, abs=1.5)
     for size in ((1, 1), (7, 90), (40, 30)):
         assert is_honest(finder.find(np.random.default_rng(1).integers(0, 256, size, dtype=np.uint8)))
+
+
+@pytest.mark.parametrize("detector", ["projection", "cbs"])
+def test_no_frame_waits_for_the_compiler(detector: Detector) -> None:
+    # In a process of its own: in this one other tests have compiled the kernels for every kind of image.
+    command = [sys.executable, "-m", "tests.vision.count_compilations", detector]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    n_warm, n_late = (int(word) for word in done.stdout.split())
+    assert n_warm > 5
+    assert n_late == 0
 
 
 @pytest.mark.parametrize(
