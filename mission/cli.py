@@ -11,7 +11,7 @@ import sys
 import tempfile
 import traceback
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NoReturn
+from typing import TYPE_CHECKING, Annotated, Literal, NoReturn
 
 import typer
 
@@ -45,6 +45,7 @@ SeedOption = Annotated[int, typer.Option(min=0, help="Seed of wind, sensors and 
 WindOption = Annotated[float, typer.Option(min=0, max=20, help="Mean wind [m/s], with the gusts that belong to it.")]
 WorldOption = Annotated[str | None, typer.Option(help="A world's name or file; by default medium_voltage.")]
 LogOption = Annotated[Path, typer.Option(help="The folder for logs.")]
+DetectorName = Literal["projection", "cbs", "hough", "lsd", "edlines"]  # vision.pipeline.Detector, without its import
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON instead of tables.")]
 
 
@@ -176,12 +177,15 @@ def detect(
     source: Annotated[Path, typer.Argument(metavar="IMAGE|FOLDER|VIDEO", help="What to look at.")],
     as_json: Annotated[bool, typer.Option("--json", help="Print one JSON object a line.")] = False,
     draw: Annotated[Path | None, typer.Option(help="Draw the lines: a file for one image, else a folder.")] = None,
+    detector: Annotated[
+        DetectorName, typer.Option(help="What finds the edges; flights use projection.")
+    ] = "projection",
 ) -> None:
     """Find the power lines in photographs or a video."""
     from mission.detect import DetectError, detect_all
 
     try:
-        n_unreadable = detect_all(source, as_json=as_json, draw_to=draw)
+        n_unreadable = detect_all(source, detector, as_json=as_json, draw_to=draw)
     except DetectError as error:
         _fail(str(error), EXIT_BAD_INPUT)
     if n_unreadable:

@@ -13,7 +13,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from vision.pipeline import LineFinder, VisionSettings
+from vision.pipeline import Detector, LineFinder, VisionSettings
 from vision.records import Detection
 
 IMAGE_SUFFIXES = {".bmp", ".jpeg", ".jpg", ".png", ".tif", ".tiff", ".webp"}
@@ -116,12 +116,12 @@ def _read_video(file: Path) -> Iterator[Picture]:
         video.release()
 
 
-def detect_all(source: Path, *, as_json: bool, draw_to: Path | None) -> int:
+def detect_all(source: Path, detector: Detector, *, as_json: bool, draw_to: Path | None) -> int:
     """Detect in all that `source` holds, print a line for each picture, draw; returns how many could not be read.
 
     `draw_to` is a file for a single image, else a folder, which is made. Raises DetectError.
     """
-    finder = LineFinder(VisionSettings())
+    finder = LineFinder(VisionSettings(detector=detector))
     finder.warm_up()
     is_single = source.is_file() and source.suffix.lower() not in VIDEO_SUFFIXES
     n_unreadable = 0

@@ -116,6 +116,20 @@ def test_detect_prints_one_object_a_line_and_draws(tmp_path: Path) -> None:
     assert sorted(file.name for file in (tmp_path / "drawn").iterdir()) == ["a.png", "b.png"]
 
 
+@pytest.mark.parametrize("detector", ["cbs", "lsd"])
+def test_detect_compares_detectors(tmp_path: Path, detector: str) -> None:
+    draw_line_photo(tmp_path / "a.png")
+    ran = lineflight("detect", tmp_path / "a.png", "--json", "--detector", detector)
+    assert_plain(ran, 0)
+    assert json.loads(ran.out)["angle_deg"] == pytest.approx(20.0, abs=1.0)
+
+
+def test_detect_names_the_detectors_it_has(tmp_path: Path) -> None:
+    ran = lineflight("detect", tmp_path, "--detector", "magic")
+    assert_plain(ran, 2)
+    assert "projection" in ran.err
+
+
 def test_detect_goes_on_after_a_broken_image(tmp_path: Path) -> None:
     (tmp_path / "a.jpg").write_bytes(b"not a jpeg")
     draw_line_photo(tmp_path / "b.png")
