@@ -11,6 +11,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
+from vision.checks import check_shares
 from vision.gradient import UNIT, unit_gradient, working_scale
 from vision.peaks import find_peaks, line_lengths
 from vision.projection import project
@@ -51,12 +52,15 @@ class ProjectionSettings:
 
     That is `min_coherence` in the mean over the frame's chord, or over `min_length_share` of the frame's diagonal where
     the chord is shorter. A gradient below `min_contrast` [grey levels per pixel of the shrunk image]
-    counts less.
+    counts less. Raises ValueError for what cannot work.
     """
 
     min_coherence: float = 0.3
     min_length_share: float = 0.25
     min_contrast: float = 2.5
+
+    def __post_init__(self) -> None:
+        check_shares(self, "min_coherence", "min_length_share")
 
 
 class ProjectionFinder:

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from vision.cbs import find_segments
+from vision.checks import check_shares
 from vision.circle import make_circle
 from vision.edge_lines import EdgeLines, edge_lines, measure_steps
 from vision.edges import find_edges
@@ -33,12 +34,15 @@ class EdgeLineFinder(Protocol):
 
 @dataclass(frozen=True, slots=True)
 class EdgeSettings:
-    """Adaptive Canny (vision.edges.find_edges)."""
+    """Adaptive Canny (vision.edges.find_edges). Raises ValueError for what cannot work."""
 
     blur_sigma_px: float = 1.0
     quantile: float = 0.96
     low_ratio: float = 0.4
     min_contrast: float = 2.0  # grey levels per pixel
+
+    def __post_init__(self) -> None:
+        check_shares(self, "quantile", "low_ratio")
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,10 +64,7 @@ class CbsSettings:
             )
         if self.skip_px < 1 or self.seed_grid_px < 1:
             raise ValueError("skip_px and seed_grid_px are steps in pixels: choose 1 or more.")
-        for name in ("min_fill", "min_walk_fill"):
-            value = getattr(self, name)
-            if not 0.0 < value <= 1.0:
-                raise ValueError(f"{name} is {value}, but it is a share: choose it above 0 and at most 1.")
+        check_shares(self, "min_fill", "min_walk_fill")
 
 
 @dataclass(frozen=True, slots=True)

@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from vision.checks import check_shares
 from vision.conductors import Conductor, find_conductors
 from vision.edge_lines import ProjectionFinder, ProjectionSettings
 from vision.edges import to_grey
@@ -47,6 +48,9 @@ class VisionSettings:
     # texture adds up to along so many pixels: in a small image a line has to be surer than in a large one.
     presence_min_support: float = 0.68
     presence_min_sigmas: float = 10.5
+
+    def __post_init__(self) -> None:
+        check_shares(self, "min_coherence", "min_relative_support", "min_relative_contrast", "presence_min_support")
 
 
 def make_edge_finder(settings: VisionSettings) -> EdgeLineFinder:

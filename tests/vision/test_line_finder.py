@@ -3,6 +3,7 @@
 import math
 import subprocess
 import sys
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -12,7 +13,8 @@ from hypothesis.extra.numpy import arrays
 from numpy.typing import NDArray
 
 from tests.vision.nadir_frames import draw_line, expose, ground, nadir_frame
-from vision.finders import CbsSettings
+from vision.edge_lines import ProjectionSettings
+from vision.finders import CbsSettings, EdgeSettings
 from vision.orientation import line_angle_distance_rad
 from vision.pipeline import Detector, LineFinder, VisionSettings
 from vision.records import Detection, wrap_line_angle_rad
@@ -242,6 +244,20 @@ def test_no_frame_waits_for_the_compiler(detector: Detector) -> None:
     n_warm, n_late = (int(word) for word in done.stdout.split())
     assert n_warm > 5
     assert n_late == 0
+
+
+@pytest.mark.parametrize(
+    ("make", "words"),
+    [
+        (lambda: EdgeSettings(quantile=1.5), "quantile is 1.5"),
+        (lambda: EdgeSettings(low_ratio=0.0), "low_ratio is 0.0"),
+        (lambda: ProjectionSettings(min_coherence=2.0), "min_coherence is 2.0"),
+        (lambda: VisionSettings(presence_min_support=0.0), "presence_min_support is 0.0"),
+    ],
+)
+def test_what_is_no_share_is_refused(make: Callable[[], object], words: str) -> None:
+    with pytest.raises(ValueError, match=words):
+        make()
 
 
 @pytest.mark.parametrize(
