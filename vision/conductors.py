@@ -129,9 +129,9 @@ def _four_edges(
     """
     left, first, second, right = row
     outer = _conductor(left, right, edges, grey, max_width_px)
-    beside = [_conductor(i, j, edges, grey, max_width_px, may_grow=False) for i, j in ((left, first), (second, right))]
     if outer.width_px <= max_width_px and not outer.has_gap:
         return [outer]
+    beside = [_conductor(i, j, edges, grey, max_width_px, may_grow=False) for i, j in ((left, first), (second, right))]
     if min(conductor.contrast for conductor in beside) >= _MIN_NEIGHBOUR_CONTRAST * inner.contrast:
         return beside
     return [inner]
