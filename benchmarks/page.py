@@ -7,7 +7,8 @@ PAGE = Path(__file__).resolve().parent.parent / "docs" / "benchmarks.md"
 
 def write_section(title: str, text: str, page: Path = PAGE) -> None:
     """Put `text` under the heading `## title` of the page, in place of what stood there; the last section goes last."""
-    before, heading = page.read_text(encoding="utf-8"), f"## {title}\n"
+    before = page.read_text(encoding="utf-8") if page.exists() else "# Benchmarks\n"
+    heading = f"## {title}\n"
     head, found, rest = before.partition(heading)
     _, next_found, after = rest.partition("\n## ")
     tail = f"\n## {after}" if next_found else ""

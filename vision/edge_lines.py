@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from vision.checks import check_shares
 from vision.gradient import UNIT, unit_gradient, working_scale
+from vision.linking import segment_lengths_px
 from vision.peaks import find_peaks, line_lengths
 from vision.projection import project
 from vision.records import Segments
@@ -126,8 +127,7 @@ def edge_lines(grey: NDArray[np.uint8], segments: Segments, covered_px: NDArray[
 
     The share that is covered stands for the coherence.
     """
-    lengths_px = np.hypot(segments[:, 2] - segments[:, 0], segments[:, 3] - segments[:, 1])
-    coherence = covered_px / np.maximum(lengths_px, 1e-9)
+    coherence = covered_px / np.maximum(segment_lengths_px(segments), 1e-9)
     order = np.argsort(-covered_px, kind="stable")
     steps = measure_steps(grey, segments, _STEP_ASIDE_PX)
     return EdgeLines(segments[order], coherence[order], steps[order], covered_px[order])

@@ -15,7 +15,7 @@ def choose_group(
 ) -> tuple[list[Conductor], float | None]:
     """The conductors of the power line, and its main angle [rad] by the histogram of oriented segments ([Ceron] 6.1).
 
-    A conductor weighs in the histogram by its length and by how much it stands out, both squared: one across the frame
+    A conductor weighs in the histogram by the square of its length, coherence and contrast: one across the frame
     outweighs many joints of a pavement. Near the main angle, within `tolerance_rad`, those stay that have the share
     `min_support` of the best one's support and `min_contrast` of the best one's contrast, because the conductors of
     one line look alike. The angle is None where there is no conductor at all.

@@ -1,4 +1,7 @@
-"""Peaks: the lines whose projected sum no texture would reach."""
+"""Peaks: the lines whose projected sum no texture would reach.
+
+Sums and lengths are (h, h + w), laid out as vision.projection.project leaves them; lengths are in rows.
+"""
 
 import math
 
@@ -35,8 +38,9 @@ def find_peaks(
 ) -> int:
     """Find the lines whose sum is locally the largest of its sign, and large enough.
 
-    That is `min_mean` times `unit` for each row, and more than texture would give. Writes slope [columns per row], the
-    column abreast of the image's middle row, the sum's sign and how sure it is; returns how many lines there are.
+    That is `min_mean` times `unit` for each row, of which `min_length` count at least, and more than texture gives.
+    Writes to `peaks`, (n, 4): slope [columns per row], the column abreast of the image's middle row, the sum's sign and
+    how sure it is. Returns how many lines there are; more than n are left out.
     """
     height = sums.shape[0]
     width = sums.shape[1] - height

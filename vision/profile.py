@@ -25,9 +25,9 @@ class Profile:
     """What the columns say about one body.
 
     `contrast` [grey levels] is how far it stands out from both sides; 0 where it is between them, a step, or where they
-    differ more than it stands out, the border of two grounds. `has_gap`
-    says that columns inside look like the ground: these are two bodies. `grows_left_px` and `grows_right_px` say how
-    far beyond its edges [px] the columns are still as even as the body.
+    differ more than it stands out, the border of two grounds. `has_gap` says that columns inside look like the ground:
+    these are two bodies. `grows_left_px` and `grows_right_px` [px] say how far beyond its edges the columns are still
+    as even as the body.
     """
 
     contrast: float
