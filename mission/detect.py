@@ -69,6 +69,10 @@ def detect(finder: LineFinder, picture: Picture) -> tuple[Detection, dict[str, A
         "segments": np.round(detection.segments, 2).tolist(),
         "power_lines": np.round(detection.power_lines, 2).tolist(),
         "angle_deg": None if detection.angle_rad is None else round(math.degrees(detection.angle_rad), 2),
+        "offset_px": round(detection.offset_px, 2),
+        "n_lines": detection.n_lines,
+        "spacing_px": None if detection.spacing_px is None else round(detection.spacing_px, 2),
+        "confidence": round(detection.confidence, 3),
         "present": detection.is_present,
         "elapsed_ms": round(elapsed_ms, 2),
     }

@@ -1,15 +1,25 @@
 """What the executive asks of vision, and how a report is put on the map."""
 
 from collections import deque
+from dataclasses import dataclass
 from typing import Protocol
 
 from drivers.camera.camera import Intrinsics
 from drivers.clock import NS_PER_S
 from mission.autopilot import VehicleState
 from mission.guidance import GuidanceSettings, locate_line, wrap_angle_rad
+from mission.records import Event, Severity
 from mission.reporting import FlightLog
 from mission.tasks.task import Sight
 from vision.records import VisionReport
+
+
+@dataclass(frozen=True, slots=True)
+class Notice:
+    """Something that happened to the eyes: `name` is one of the events in docs/safety.md, `message` a sentence."""
+
+    name: str
+    message: str
 
 
 class Eyes(Protocol):
@@ -17,7 +27,7 @@ class Eyes(Protocol):
 
     @property
     def failure(self) -> str | None:
-        """Why no more reports will come, in one sentence; None while all is well."""
+        """Why there is nothing to be seen, in one sentence; None while all is well."""
         ...
 
     @property
@@ -27,6 +37,10 @@ class Eyes(Protocol):
 
     def take(self) -> list[VisionReport]:
         """The reports since the last call, oldest first."""
+        ...
+
+    def take_notices(self) -> list[Notice]:
+        """What happened since the last call, oldest first."""
         ...
 
 
@@ -142,6 +156,8 @@ class Lookout:
     def look(self, now_ns: int, state: VehicleState) -> Sight | None:
         """The newest report since the last look, on the map; the older ones are kept in the log alone."""
         self._history.add(state)
+        for notice in self._eyes.take_notices():
+            self._log.record(Event(now_ns, notice.name, Severity.WARNING, notice.message))
         reports = self._eyes.take()
         for report in reports:
             self._log.record(report)

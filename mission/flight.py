@@ -2,6 +2,7 @@
 
 import asyncio
 import contextlib
+import functools
 import signal
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -72,15 +73,18 @@ async def fly(setup: FlightSetup, on_progress: Callable[[Progress], None]) -> Fl
     with Recorder(
         path, mission_text=setup.mission.text, mission_name=plan.name, metadata=setup.metadata, clock=clock
     ) as recorder:
-        worker = VisionWorker(setup.open_camera, vision_settings(plan.vision), clock, plan.vision.log_rate_hz)
+        make_worker = functools.partial(
+            VisionWorker, setup.open_camera, vision_settings(plan.vision), clock, plan.vision.log_rate_hz
+        )
+        eyes = WorkerEyes(make_worker, clock)
         autopilot = MavsdkAutopilot(
             setup.connection, clock, lambda text: recorder.record_status_text(clock.now_ns(), f"mavsdk {text}")
         )
         camera = pinhole_intrinsics(plan.camera)
-        executive = Executive(plan, autopilot, WorkerEyes(worker, clock), recorder, clock, camera)
+        executive = Executive(plan, autopilot, eyes, recorder, clock, camera)
         if setup.true_line is not None:
             recorder.record(setup.true_line)
-        worker.start()
+        eyes.start()
         with _stop_signals(executive.request_stop):
             sides = [asyncio.create_task(_every(_PROGRESS_RATE_HZ, 1.0, lambda: on_progress(executive.progress)))]
             if setup.true_pose is not None:
@@ -94,7 +98,7 @@ async def fly(setup: FlightSetup, on_progress: Callable[[Progress], None]) -> Fl
                     side.cancel()
                 await asyncio.gather(*sides, return_exceptions=True)
                 await autopilot.close()
-                worker.stop()
+                eyes.stop()
         on_progress(executive.progress)
     return FlightOutcome(ended, executive.may_have_armed, path, recorder.failure)
 

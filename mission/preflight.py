@@ -48,6 +48,7 @@ async def wait_until_ready(
             else:
                 missing = ["an autopilot on the link"]
             eyes.take()
+            eyes.take_notices()
             tell(tuple(missing))
             if not missing or loop.time() > limit_s:
                 return missing

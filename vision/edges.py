@@ -18,6 +18,12 @@ _SOBEL_GAIN = 8.0  # a 3x3 Sobel kernel answers a ramp of one grey level per pix
 _N_SAMPLES = 8000  # pixels that the gradient's quantile is taken from
 
 
+def is_image(image: NDArray[np.generic]) -> bool:
+    """Whether it is what the line finder reads: (h, w) grey or (h, w, 3) BGR uint8, not empty."""
+    has_shape = image.ndim == 2 or (image.ndim == 3 and image.shape[2] == 3)
+    return image.dtype == np.uint8 and has_shape and image.size > 0
+
+
 def to_grey(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """Return `image`, (h, w) grey or (h, w, 3) BGR uint8, as (h, w) grey.
 
@@ -25,7 +31,7 @@ def to_grey(image: NDArray[np.uint8]) -> NDArray[np.uint8]:
     """
     if image.dtype != np.uint8:
         raise ValueError(f"The image is {image.dtype}, but the line finder reads uint8: convert it first.")
-    if image.size == 0 or image.ndim not in (2, 3) or (image.ndim == 3 and image.shape[2] != 3):
+    if not is_image(image):
         raise ValueError(
             f"The image has the shape {image.shape}, but the line finder reads (height, width) grey or "
             "(height, width, 3) BGR: convert it first."

@@ -1,5 +1,6 @@
 """The line group: which of the conductors are the power line, which way it runs and where its middle passes."""
 
+import itertools
 import math
 
 import numpy as np
@@ -53,10 +54,10 @@ def middle_offset_px(conductors: list[Conductor], angle_rad: float, shape: tuple
     return 0.5 * (min(offsets_px) + max(offsets_px))
 
 
-def n_abreast(conductors: list[Conductor], angle_rad: float, shape: tuple[int, int]) -> int:
-    """The most conductors that a cut across the group meets, seen along `angle_rad`; `shape` is (height, width).
+def abreast(conductors: list[Conductor], angle_rad: float, shape: tuple[int, int]) -> list[Conductor]:
+    """The conductors that one cut across the group meets, the fullest of all cuts; `shape` is (height, width).
 
-    Two pieces one behind the other are one conductor, bent where a pole holds it.
+    Two pieces one behind the other, seen along `angle_rad`, are one conductor, bent where a pole holds it.
     """
     spans: list[tuple[float, float]] = []
     for conductor in conductors:
@@ -66,4 +67,13 @@ def n_abreast(conductors: list[Conductor], angle_rad: float, shape: tuple[int, i
         spans.append((low, high))
     # The fullest cut is among those just behind a span's start.
     slack_px = _BEND_OVERLAP * math.hypot(*shape)
-    return max((sum(low <= start + slack_px <= high for low, high in spans) for start, _ in spans), default=0)
+    cuts = ([low <= start + slack_px <= high for low, high in spans] for start, _ in spans)
+    return list(itertools.compress(conductors, max(cuts, key=sum, default=[])))
+
+
+def spacing_px(conductors: list[Conductor], angle_rad: float, shape: tuple[int, int]) -> float | None:
+    """Median distance [px] of neighbours among conductors abreast of each other; None for fewer than two."""
+    if len(conductors) < 2:
+        return None
+    offsets_px = sorted(offset_px(conductor, angle_rad, shape) for conductor in conductors)
+    return float(np.median(np.diff(offsets_px)))

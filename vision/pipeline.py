@@ -12,7 +12,7 @@ from vision.conductors import Conductor, find_conductors
 from vision.edge_lines import ProjectionFinder, ProjectionSettings
 from vision.edges import to_grey
 from vision.finders import BaselineFinder, CbsFinder, CbsSettings, EdgeLineFinder, EdgeSettings, LinkSettings
-from vision.line_group import choose_group, middle_offset_px, n_abreast
+from vision.line_group import abreast, choose_group, middle_offset_px, spacing_px
 from vision.orientation import main_angle_rad, mean_line_angle_rad, segment_angles_rad
 from vision.records import Detection, Segments
 
@@ -110,7 +110,7 @@ class LineFinder:
             # Without a conductor the longest edges say which way the image runs.
             weights = (edges.coherence * edges.covered_px) ** 2
             peak_rad = main_angle_rad(segment_angles_rad(edges.segments), weights)
-            return Detection(edges.segments, power_lines, peak_rad, 0.0, 0, 0.0, False)
+            return Detection(edges.segments, power_lines, peak_rad, 0.0, 0, None, 0.0, False)
         return self._judge(edges.segments, power_lines, group, shape)
 
     def _judge(
@@ -131,12 +131,14 @@ class LineFinder:
         )
         # Each conductor is a witness, and it is wrong with the share of the frame that it does not surely cover.
         confidence = 1.0 - math.prod(1.0 - c.support for c in group)
+        row = abreast(group, angle_rad, shape)
         return Detection(
             segments,
             power_lines,
             angle_rad,
             middle_offset_px(group, angle_rad, shape),
-            n_abreast(group, angle_rad, shape),
+            len(row),
+            spacing_px(row, angle_rad, shape),
             confidence if is_present else min(confidence, settings.presence_min_support),
             is_present,
         )

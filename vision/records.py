@@ -4,6 +4,7 @@ Angles: from image up, clockwise positive, in (-pi/2, pi/2] (docs/conventions.md
 x right, y down, the centre of the first pixel at (0, 0).
 """
 
+import enum
 import math
 from dataclasses import dataclass
 
@@ -12,6 +13,9 @@ from numpy.typing import NDArray
 
 Segments = NDArray[np.float64]
 """(n, 4) float64 [px]: x1, y1, x2, y2 of each segment; read-only."""
+
+NO_LINES: Segments = np.empty((0, 4))
+NO_LINES.setflags(write=False)
 
 
 def wrap_line_angle_rad(angle_rad: float) -> float:
@@ -30,19 +34,22 @@ class LineEstimate:
 
     The group's middle line runs along d = (sin angle_rad, -cos angle_rad) and passes the image centre at `offset_px`
     along its right-hand normal n = (cos angle_rad, sin angle_rad); so at angle 0 a positive offset is a line right of
-    the centre. `n_lines` counts the conductors taken, `confidence` is in [0, 1], `t_capture_ns` is the frame's.
+    the centre. `n_lines` counts the conductors taken; `spacing_px` is the median distance of neighbours among them,
+    None for a single one. `confidence` is in [0, 1], `t_capture_ns` is the frame's. Where the lens is calibrated, the
+    pixels are those of the undistorted image.
     """
 
     angle_rad: float
     offset_px: float
     n_lines: int
+    spacing_px: float | None
     confidence: float
     t_capture_ns: int
 
 
 @dataclass(frozen=True, slots=True, eq=False)  # arrays have no single answer to ==
 class Detection:
-    """All that the pipeline found in one image; `angle_rad` and `offset_px` as in LineEstimate.
+    """All that the pipeline found in one image; `angle_rad`, `offset_px` and `spacing_px` as in LineEstimate.
 
     Segments run with the brighter side of their edge on their right. `angle_rad` is None where the image holds no
     segment at all. `is_present` says whether at least one thin conductor crosses enough of the frame (docs/decisions,
@@ -54,6 +61,7 @@ class Detection:
     angle_rad: float | None
     offset_px: float
     n_lines: int
+    spacing_px: float | None
     confidence: float
     is_present: bool
 
@@ -61,14 +69,43 @@ class Detection:
         """The estimate that guidance gets for a frame taken at `t_capture_ns`: None where no line is present."""
         if not self.is_present or self.angle_rad is None:
             return None
-        return LineEstimate(self.angle_rad, self.offset_px, self.n_lines, self.confidence, t_capture_ns)
+        return LineEstimate(
+            self.angle_rad, self.offset_px, self.n_lines, self.spacing_px, self.confidence, t_capture_ns
+        )
+
+
+class Track(enum.StrEnum):
+    """How a frame continues those before it (vision.tracking)."""
+
+    SEARCHING = "searching"
+    """No line has been tracked yet."""
+    TRACKING = "tracking"
+    """The frame shows the line where it may be: its estimate counts."""
+    DOUBTFUL = "doubtful"
+    """The line was there a moment ago; this frame shows none, or one elsewhere."""
+    LOST = "lost"
+    """A line was tracked, and has not been seen for a while."""
+
+
+class Trouble(enum.StrEnum):
+    """What is wrong with a frame (vision.frame_check)."""
+
+    UNREADABLE = "unreadable"
+    """It is no 8-bit grey or BGR image."""
+    DARK = "dark"
+    OVEREXPOSED = "overexposed"
+    FLAT = "flat"
+    """It shows no contrast: a covered lens, fog."""
+    FROZEN = "frozen"
+    """It has been the very same image for a while: the camera repeats itself."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)  # arrays have no single answer to ==
 class VisionReport:
     """What the vision worker sends for each frame it worked on.
 
-    `estimate` is None where no line is present. `latency_ns` is flight time from capture to this record, `work_ns` the
+    `estimate` is None where no line is present, and where `track` or `trouble` say that it must not steer; `trouble` is
+    None for a sound frame. `latency_ns` is flight time from capture to this record, `work_ns` the
     pipeline's own time, `n_dropped` counts the camera's frames skipped since the last report. `power_lines` are kept
     for the log. `jpeg` holds the frame for the frames that the log keeps, else None.
     """
@@ -76,6 +113,8 @@ class VisionReport:
     seq: int
     t_capture_ns: int
     estimate: LineEstimate | None
+    track: Track
+    trouble: Trouble | None
     power_lines: Segments
     latency_ns: int
     work_ns: int

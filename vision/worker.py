@@ -9,9 +9,9 @@ from drivers.clock import ScaledClock
 from vision.outbox import Inbox
 from vision.pipeline import VisionSettings
 from vision.records import VisionReport
-from vision.worker_process import WorkerEvent, WorkerFailed, WorkerReady, run_worker
+from vision.worker_process import CameraBack, CameraGone, WorkerEvent, WorkerFailed, WorkerReady, run_worker
 
-__all__ = ["VisionWorker", "WorkerEvent", "WorkerFailed", "WorkerReady"]
+__all__ = ["CameraBack", "CameraGone", "VisionWorker", "WorkerEvent", "WorkerFailed", "WorkerReady"]
 
 _KILL_TIMEOUT_S = 1.0
 
@@ -76,13 +76,20 @@ class VisionWorker:
             if isinstance(record, VisionReport):
                 record.power_lines.setflags(write=False)  # pickling forgets it
                 news.append(record)
-            elif isinstance(record, WorkerReady | WorkerFailed):
+            elif isinstance(record, WorkerEvent):
                 self._has_failed |= isinstance(record, WorkerFailed)
                 news.append(record)
         if self._inbox.is_ended and not self._has_failed:
             self._has_failed = True
             news.append(WorkerFailed(f"The vision worker ended without a word{_exit_words(self._process.exitcode)}."))
         return news
+
+    def kill(self) -> None:
+        """End the worker at once, whatever it hangs in; waits for nothing. `poll` gives nothing any more."""
+        self._hang_up()
+        if self._process.pid is not None and self._process.is_alive():
+            self._process.kill()
+        self._inbox.is_ended = self._has_failed = True
 
     def stop(self, timeout_s: float = 3.0) -> None:
         """Ask the worker to end, wait at most `timeout_s` [s, wall], then kill it. Safe to call twice."""

@@ -12,6 +12,10 @@ class CameraError(Exception):
     """The camera could not be opened or read; the message is one sentence for a person."""
 
 
+class CameraLost(CameraError):
+    """A camera that gave frames gives none any more: it may be worth opening it again."""
+
+
 @dataclass(frozen=True, slots=True)
 class Frame:
     """One image and when it was taken.
@@ -59,7 +63,8 @@ class Camera(Protocol):
     def read(self, timeout_s: float) -> Frame | None:
         """Wait for a frame that was not returned before, and return the newest; None after `timeout_s` [s, wall].
 
-        Raises EOFError when a finite source has ended, CameraError when the device is lost.
+        Raises EOFError when a finite source has ended, CameraLost when the device is gone, CameraError when what it
+        gives cannot be used.
         """
         ...
 

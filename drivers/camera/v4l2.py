@@ -10,7 +10,7 @@ from typing import Protocol, Self
 import cv2
 import numpy as np
 
-from drivers.camera.camera import CameraError, CameraSettings, Frame
+from drivers.camera.camera import CameraError, CameraLost, CameraSettings, Frame
 from drivers.camera.mailbox import Mailbox
 from drivers.clock import NS_PER_S, ScaledClock
 
@@ -57,7 +57,7 @@ class V4l2Camera:
     def read(self, timeout_s: float) -> Frame | None:
         """Wait for a frame that was not returned before; None after `timeout_s` [s, wall].
 
-        `t_capture_ns` is the driver's own stamp. Raises CameraError when the device is lost.
+        `t_capture_ns` is the driver's own stamp. Raises CameraLost when the device is gone.
         """
         return self._mailbox.get(timeout_s)
 
@@ -81,7 +81,7 @@ class V4l2Camera:
                 if is_read:
                     is_read, image = self._capture.retrieve()
                 if not is_read:
-                    raise CameraError(f"The camera {self._device} stopped giving frames; check its cable.")
+                    raise CameraLost(f"The camera {self._device} stopped giving frames; check its cable.")
                 if image.shape[:2] != (self._settings.height_px, self._settings.width_px):
                     raise CameraError(f"The camera {self._device} changed its size to {image.shape[1::-1]} in flight.")
                 frame = np.asarray(image, dtype=np.uint8)
@@ -91,7 +91,7 @@ class V4l2Camera:
         except CameraError as error:
             self._mailbox.close(error)
         except Exception as error:  # a thread that ends silently would look like the end of a recording
-            self._mailbox.close(CameraError(f"The camera {self._device} failed: {error}"))
+            self._mailbox.close(CameraLost(f"The camera {self._device} failed: {error}"))
         finally:
             self._mailbox.close()
             self._capture.release()

@@ -121,6 +121,8 @@ def _report(entry: VisionEntry, jpeg: bytes | None) -> VisionReport:
         seq=entry.seq,
         t_capture_ns=entry.t_ns,
         estimate=entry.estimate,
+        track=entry.track,
+        trouble=entry.trouble,
         power_lines=power_lines,
         latency_ns=entry.latency_ns,
         work_ns=entry.work_ns,

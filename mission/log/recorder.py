@@ -215,6 +215,8 @@ class _FlightLog:
                 t_ns=report.t_capture_ns,
                 seq=report.seq,
                 estimate=report.estimate,
+                track=report.track,
+                trouble=report.trouble,
                 power_lines_px=tuple((x1, y1, x2, y2) for x1, y1, x2, y2 in lines_px),
                 latency_ns=report.latency_ns,
                 work_ns=report.work_ns,

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from vision.records import LineEstimate
+from vision.records import LineEstimate, Track, Trouble
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +47,8 @@ class VisionEntry:
     t_ns: int
     seq: int
     estimate: LineEstimate | None
+    track: Track
+    trouble: Trouble | None
     power_lines_px: tuple[tuple[float, float, float, float], ...]
     latency_ns: int
     work_ns: int

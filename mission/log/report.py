@@ -82,7 +82,9 @@ def _figures(report: FlightReport, width: int) -> Table:
         yaw = report.yaw_error
         table.add_row("  true heading error", f"{yaw.median_deg:.1f}° median, {yaw.p95_deg:.1f}° p95")
     vision = report.vision
-    table.add_row("  vision", f"a line in {vision.estimates} of {vision.frames} frames")
+    words = f"a line in {vision.estimates} of {vision.frames} frames, {vision.doubtful} were doubtful"
+    words += "".join(f", {count} {name}" for name, count in vision.troubles.items())
+    table.add_row("  vision", words)
     if vision.latency_ms is not None:
         latency = vision.latency_ms
         words = f"{latency.p50:.0f} ms median, {latency.p95:.0f} ms p95, {latency.p99:.0f} ms p99"

@@ -1,5 +1,6 @@
 """Work out from a flight's records what happened and how well it was flown."""
 
+from collections import Counter
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -9,7 +10,7 @@ from drivers.clock import NS_PER_S
 from mission.log.measures import Floats, line_fit_distances_m, nearest_on_axis, offboard_gaps_s
 from mission.log.reader import Flight
 from mission.records import TaskEnded, TrueLine
-from vision.records import wrap_line_angle_rad
+from vision.records import Track, wrap_line_angle_rad
 
 FOLLOW_TASK = "follow_lines"
 UNFINISHED = "unfinished"
@@ -75,10 +76,16 @@ class Percentiles:
 
 @dataclass(frozen=True, slots=True)
 class VisionSummary:
-    """How many frames vision worked on, in how many it saw a line, and how old its news was [ms]."""
+    """How many frames vision worked on, in how many it saw a line, and how old its news was [ms].
+
+    `doubtful` counts the frames of a tracked line that showed none, or one elsewhere; `troubles` those that were dark,
+    frozen and so on, by the name of the trouble.
+    """
 
     frames: int
     estimates: int
+    doubtful: int
+    troubles: dict[str, int]
     latency_ms: Percentiles | None
 
 
@@ -236,6 +243,8 @@ def _vision(flight: Flight) -> VisionSummary:
     return VisionSummary(
         frames=len(flight.reports),
         estimates=sum(report.estimate is not None for report in flight.reports),
+        doubtful=sum(report.track is Track.DOUBTFUL for report in flight.reports),
+        troubles=dict(Counter(str(report.trouble) for report in flight.reports if report.trouble is not None)),
         latency_ms=None if not latency_ms.size else Percentiles(*(_percentile(latency_ms, p) for p in (50, 95, 99))),
     )
 

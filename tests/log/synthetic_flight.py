@@ -20,7 +20,7 @@ from mission.records import (
     TrueLine,
     TruePose,
 )
-from vision.records import LineEstimate, VisionReport, wrap_line_angle_rad
+from vision.records import LineEstimate, Track, VisionReport, wrap_line_angle_rad
 
 START_NS = 5_000 * NS_PER_S
 TICK_NS = NS_PER_S // 20
@@ -147,9 +147,11 @@ def see(seq: int, t_ns: int, pose: tuple[float, float, float, float], *, has_ima
     is_present = bool(lines) and down_m < -12.0
     segments = np.array(lines if is_present else [], dtype=np.float64).reshape(-1, 4)
     segments.setflags(write=False)
-    estimate = LineEstimate(angle_rad, offset_px, len(segments), 0.9, t_ns) if is_present else None
+    estimate = LineEstimate(angle_rad, offset_px, len(segments), px_per_m, 0.9, t_ns) if is_present else None
+    track = Track.TRACKING if is_present else Track.LOST
     jpeg = draw_ground(seq, lines) if has_image else None
-    return VisionReport(seq, t_ns, estimate, segments, 30_000_000 + seq % 7 * 1_000_000, 12_000_000, 0, jpeg)
+    latency_ns = 30_000_000 + seq % 7 * 1_000_000
+    return VisionReport(seq, t_ns, estimate, track, None, segments, latency_ns, 12_000_000, 0, jpeg)
 
 
 def draw_ground(seed: int, lines: list[list[int]]) -> bytes:

@@ -20,6 +20,7 @@ from mission.log.report import print_report
 from mission.log.summary import FlightReport, summarise, to_json
 from mission.records import Event, MissionEnded, Result, Severity, TaskEnded, TruePose
 from tests.log.synthetic_flight import START_NS, SWAY_M, TASKS, fly, write_log
+from vision.records import Track, Trouble
 
 coordinates_m = st.floats(-1e3, 1e3)
 
@@ -141,6 +142,18 @@ def test_a_real_flight_has_no_true_figures(flight: Flight) -> None:
     assert "true" not in printed(report)
 
 
+def test_doubtful_and_troubled_frames_are_counted(flight: Flight) -> None:
+    first, second, third, *others = flight.reports
+    marked = [
+        replace(first, track=Track.DOUBTFUL),
+        replace(second, trouble=Trouble.DARK, track=Track.DOUBTFUL),
+        replace(third, trouble=Trouble.DARK),
+    ]
+    vision = summarise(replace(flight, reports=(*marked, *others))).vision
+    assert (vision.doubtful, vision.troubles) == (2, {"dark": 2})
+    assert "2 were doubtful, 2 dark" in printed(summarise(replace(flight, reports=(*marked, *others))))
+
+
 def test_the_json_keeps_its_shape(report: FlightReport) -> None:
     data = json.loads(json.dumps(to_json(report)))
     assert data.keys() >= {
@@ -149,7 +162,7 @@ def test_the_json_keeps_its_shape(report: FlightReport) -> None:
     assert data["tasks"][0].keys() >= {"task", "start_s", "end_s", "result"}
     assert data["legs"][0].keys() == {"task", "n_points", "avg_error_m", "p95_error_m"}
     assert data["lateral"].keys() == {"mean_m", "p95_m", "max_m"}
-    assert data["vision"].keys() == {"frames", "estimates", "latency_ms"}
+    assert data["vision"].keys() == {"frames", "estimates", "doubtful", "troubles", "latency_ms"}
     assert data["vision"]["latency_ms"].keys() == {"p50", "p95", "p99"}
     assert data["setpoints"].keys() == {"rate_hz", "max_gap_ms"}
     assert data["events"][0].keys() == {"t_s", "name", "severity", "message", "reaction"}

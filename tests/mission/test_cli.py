@@ -108,7 +108,8 @@ def test_detect_prints_one_object_a_line_and_draws(tmp_path: Path) -> None:
     assert [Path(entry["file"]).name for entry in entries] == ["a.png", "b.jpg"]
     for entry in entries:
         assert set(entry) == {
-            "file", "width", "height", "segments", "power_lines", "angle_deg", "present", "elapsed_ms",
+            "file", "width", "height", "segments", "power_lines", "angle_deg", "offset_px", "n_lines",
+            "spacing_px", "confidence", "present", "elapsed_ms",
         }  # fmt: skip
         assert (entry["width"], entry["height"]) == (640, 480)
         assert entry["present"] is True

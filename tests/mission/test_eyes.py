@@ -9,7 +9,7 @@ from mission.autopilot import FlightMode, LandedState, VehicleState
 from mission.build import guidance_settings, pinhole_intrinsics
 from mission.eyes import GroupSize, StateHistory, sight_of
 from mission.plan import CameraPlan, GuidancePlan
-from tests.support.geometric_eyes import NO_SEGMENTS
+from tests.support.geometric_eyes import bare_report
 from vision.records import LineEstimate, VisionReport
 
 STATE = VehicleState(
@@ -50,8 +50,8 @@ def test_the_history_forgets() -> None:
 
 
 def report(t_ns: int, n_lines: int | None) -> VisionReport:
-    estimate = None if n_lines is None else LineEstimate(0.1, 5.0, n_lines, 1.0, t_ns)
-    return VisionReport(0, t_ns, estimate, NO_SEGMENTS, 0, 0, 0, None)
+    estimate = None if n_lines is None else LineEstimate(0.1, 5.0, n_lines, None, 1.0, t_ns)
+    return bare_report(0, t_ns, estimate)
 
 
 def test_an_old_estimate_does_not_steer() -> None:

@@ -27,7 +27,7 @@ def state_at(setpoint: Setpoint, **changes: object) -> VehicleState:
 
 
 def sight(line: WorldLine | None, yaw_rad: float = 0.0, *, is_whole: bool = True) -> Sight:
-    estimate = None if line is None else LineEstimate(0.0, 0.0, 3, 1.0, 0)
+    estimate = None if line is None else LineEstimate(0.0, 0.0, 3, None, 1.0, 0)
     return Sight(0, yaw_rad, estimate, line, is_whole)
 
 

@@ -10,10 +10,10 @@ import numpy as np
 
 from drivers.camera.camera import Intrinsics
 from drivers.clock import Clock
+from mission.eyes import Notice
 from tests.support.in_process import InProcessAutopilot
-from vision.records import LineEstimate, VisionReport, wrap_line_angle_rad
+from vision.records import NO_LINES, LineEstimate, Track, VisionReport, wrap_line_angle_rad
 
-NO_SEGMENTS = np.zeros((0, 4))
 FRAME_PERIOD_NS = 40_000_000
 LATENCY_NS = 60_000_000
 _REACHES_M = np.linspace(-60.0, 60.0, 241)
@@ -55,7 +55,13 @@ def see_line(
     normal = (math.cos(angle_rad), math.sin(angle_rad))
     centre = ((camera.width_px - 1) / 2, (camera.height_px - 1) / 2)
     offset_px = normal[0] * (x0 - centre[0]) + normal[1] * (y0 - centre[1])
-    return LineEstimate(angle_rad, offset_px, 3, 1.0, t_capture_ns)
+    return LineEstimate(angle_rad, offset_px, 3, None, 1.0, t_capture_ns)
+
+
+def bare_report(seq: int, t_capture_ns: int, estimate: LineEstimate | None, latency_ns: int = 0) -> VisionReport:
+    """A sound frame's report that carries nothing but the estimate."""
+    track = Track.SEARCHING if estimate is None else Track.TRACKING
+    return VisionReport(seq, t_capture_ns, estimate, track, None, NO_LINES, latency_ns, 0, 0, None)
 
 
 class GeometricEyes:
@@ -93,8 +99,12 @@ class GeometricEyes:
                 estimate = see_line(
                     vehicle.position_m, vehicle.quaternion, self._camera, self._point, self._heading_rad, now_ns
                 )
-            self._pending.append(VisionReport(self._seq, now_ns, estimate, NO_SEGMENTS, LATENCY_NS, 0, 0, None))
+            self._pending.append(bare_report(self._seq, now_ns, estimate, LATENCY_NS))
             self._seq += 1
         due = [report for report in self._pending if now_ns - report.t_capture_ns >= LATENCY_NS]
         self._pending = [report for report in self._pending if now_ns - report.t_capture_ns < LATENCY_NS]
         return due
+
+    def take_notices(self) -> list[Notice]:
+        """Nothing ever happens to these eyes."""
+        return []

@@ -8,7 +8,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from vision.conductors import Conductor
-from vision.line_group import choose_group, middle_offset_px, n_abreast, offset_px
+from vision.line_group import abreast, choose_group, middle_offset_px, offset_px, spacing_px
 
 SHAPE = (480, 640)
 Axis = tuple[float, float, float, float]
@@ -65,4 +65,14 @@ def test_the_middle_lies_halfway_between_the_outermost() -> None:
 
 def test_a_bent_conductor_is_one() -> None:
     upper, lower = conductor((200.0, 0.0, 204.0, 200.0)), conductor((204.0, 195.0, 190.0, 479.0))
-    assert n_abreast([upper, lower, conductor(upright(270.0))], 0.0, SHAPE) == 2
+    beside = conductor(upright(270.0))
+    row = abreast([upper, lower, beside], 0.0, SHAPE)
+    assert len(row) == 2
+    assert beside in row
+
+
+def test_the_spacing_is_that_of_neighbours() -> None:
+    row = [conductor(upright(x)) for x in (440.0, 300.0, 340.0, 380.0)]
+    assert spacing_px(row, 0.0, SHAPE) == pytest.approx(40.0)
+    assert spacing_px(row[:1], 0.0, SHAPE) is None
+    assert abreast([], 0.0, SHAPE) == []

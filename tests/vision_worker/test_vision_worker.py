@@ -19,7 +19,7 @@ from drivers.clock import NS_PER_S, ScaledClock
 from tests.vision_worker import worker_cameras
 from tests.vision_worker.worker_cameras import FRAME_PERIOD_NS, EndlessCamera, HungCamera, make_frame
 from vision.pipeline import LineFinder, VisionSettings
-from vision.records import VisionReport
+from vision.records import Track, VisionReport
 from vision.worker import VisionWorker, WorkerEvent, WorkerFailed, WorkerReady
 from vision.worker_process import Reporter
 
@@ -61,14 +61,16 @@ def test_it_says_ready_then_what_the_line_finder_sees_then_why_it_ended(start) -
     frames = [make_frame(0), make_frame(1), make_frame(4)]
     ready, *reports, failed = collect(start(partial(ScriptedCamera, [frames[0], None, *frames[1:]])), has_failed)
     assert isinstance(ready, WorkerReady)
-    assert failed == WorkerFailed("The camera's recording has ended.")
+    assert failed == WorkerFailed("The camera's recording has ended.", is_final=True)
     finder = LineFinder(VisionSettings())
     for frame, report in zip(frames, reports, strict=True):
         assert isinstance(report, VisionReport)
         detection = finder.find(frame.image)
         assert (report.seq, report.t_capture_ns) == (frame.seq, frame.t_capture_ns)
-        assert report.estimate == detection.estimate(frame.t_capture_ns)
-        assert report.estimate is not None
+        assert detection.is_present
+        # One frame alone is not believed yet.
+        assert report.estimate == (None if frame.seq == 0 else detection.estimate(frame.t_capture_ns))
+        assert report.track is (Track.SEARCHING if frame.seq == 0 else Track.TRACKING)
         np.testing.assert_array_equal(report.power_lines, detection.power_lines)
         assert not report.power_lines.flags.writeable
     assert [report.n_dropped for report in reports if isinstance(report, VisionReport)] == [0, 0, 2]

@@ -3,13 +3,14 @@
 import sys
 import threading
 import time
+from pathlib import Path
 from types import TracebackType
-from typing import Self
+from typing import Literal, Self
 
 import cv2
 import numpy as np
 
-from drivers.camera.camera import CameraError, Frame
+from drivers.camera.camera import CameraError, CameraLost, Frame
 from drivers.clock import ScaledClock
 from vision.pipeline import VisionSettings
 from vision.worker import VisionWorker
@@ -52,6 +53,38 @@ class HungCamera(EndlessCamera):
         if self._seq == 1:
             threading.Event().wait()
         return super().read(timeout_s)
+
+
+class FaultyOnce:
+    """Opens cameras: the first one gives a frame and then meets `fault`, the later ones are sound.
+
+    Processes share what is left at `trace`, an absolute path.
+    """
+
+    def __init__(self, fault: Literal["hang", "lose", "crash"], trace: str) -> None:
+        self._fault = fault
+        self._trace = Path(trace)
+
+    def __call__(self) -> EndlessCamera:
+        if self._trace.exists():
+            return EndlessCamera()
+        self._trace.touch()
+        return _Faulty(self._fault)
+
+
+class _Faulty(EndlessCamera):
+    def __init__(self, fault: str) -> None:
+        super().__init__()
+        self._fault = fault
+
+    def read(self, timeout_s: float) -> Frame | None:
+        if self._seq < 3:
+            return super().read(timeout_s)
+        if self._fault == "hang":
+            threading.Event().wait()
+        if self._fault == "lose":
+            raise CameraLost("The camera stopped giving frames; check its cable.")
+        raise RuntimeError("a driver's bug")
 
 
 def no_camera() -> EndlessCamera:
