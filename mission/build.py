@@ -58,26 +58,14 @@ def reactions(plan: p.SafetyPlan) -> Mapping[Hazard, Reaction]:
     return {Hazard(name): Reaction(value) for name, value in plan.reactions.model_dump().items()}
 
 
-def vision_settings(plan: p.VisionPlan) -> VisionSettings:
-    """The line finder's settings, with the plan's presence threshold."""
+def vision_settings(plan: p.VisionPlan, camera: Intrinsics) -> VisionSettings:
+    """The line finder's settings for a camera, with the plan's presence threshold."""
     defaults = VisionSettings()
     return replace(
         defaults,
+        camera=camera,
         presence_min_support=min(1.0, defaults.presence_min_support * plan.presence_scale),
         presence_min_sigmas=defaults.presence_min_sigmas * plan.presence_scale,
-    )
-
-
-def pinhole_intrinsics(camera: p.CameraPlan) -> Intrinsics:
-    """The undistorted camera of the plan: square pixels, the principal point in the middle."""
-    focal_px = camera.width_px / 2 / math.tan(math.radians(camera.hfov_deg) / 2)
-    return Intrinsics(
-        width_px=camera.width_px,
-        height_px=camera.height_px,
-        fx_px=focal_px,
-        fy_px=focal_px,
-        cx_px=(camera.width_px - 1) / 2,
-        cy_px=(camera.height_px - 1) / 2,
     )
 
 

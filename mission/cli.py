@@ -88,7 +88,7 @@ def dry_run(
         setup = FlightSetup(
             mission=mission_file,
             connection=simulation.connection,
-            open_camera=simulation.camera_opener(mission_file.plan.camera),
+            open_camera=simulation.camera_opener(mission_file.camera, mission_file.plan.camera.rate_hz),
             clock=clock,
             log_folder=log,
             metadata={
@@ -122,7 +122,7 @@ def run(
     from mission.live_camera import CameraError, LiveCamera
 
     try:
-        source = LiveCamera(camera or plan.camera.source, plan.camera)
+        source = LiveCamera(camera or plan.camera.source, plan.camera, mission_file.camera)
     except CameraError as error:
         _fail(str(error), EXIT_BAD_INPUT)
     with source:

@@ -13,7 +13,7 @@ from drivers.camera.camera import Camera
 from drivers.clock import ScaledClock
 from mission.autopilot import VehicleState
 from mission.autopilot_mavsdk import MavsdkAutopilot
-from mission.build import pinhole_intrinsics, vision_settings
+from mission.build import vision_settings
 from mission.executive import Executive
 from mission.log.disk import log_path
 from mission.log.recorder import Recorder
@@ -73,14 +73,14 @@ async def fly(setup: FlightSetup, on_progress: Callable[[Progress], None]) -> Fl
     with Recorder(
         path, mission_text=setup.mission.text, mission_name=plan.name, metadata=setup.metadata, clock=clock
     ) as recorder:
+        camera = setup.mission.camera
         make_worker = functools.partial(
-            VisionWorker, setup.open_camera, vision_settings(plan.vision), clock, plan.vision.log_rate_hz
+            VisionWorker, setup.open_camera, vision_settings(plan.vision, camera), clock, plan.vision.log_rate_hz
         )
         eyes = WorkerEyes(make_worker, clock)
         autopilot = MavsdkAutopilot(
             setup.connection, clock, lambda text: recorder.record_status_text(clock.now_ns(), f"mavsdk {text}")
         )
-        camera = pinhole_intrinsics(plan.camera)
         executive = Executive(plan, autopilot, eyes, recorder, clock, camera)
         if setup.true_line is not None:
             recorder.record(setup.true_line)

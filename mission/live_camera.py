@@ -5,7 +5,7 @@ from collections.abc import Callable
 from types import TracebackType
 from typing import Self
 
-from drivers.camera.camera import Camera, CameraError, CameraSettings
+from drivers.camera.camera import Camera, CameraError, CameraSettings, Intrinsics
 from drivers.camera.spec import open_camera, parse_spec
 from drivers.clock import ScaledClock
 from mission.autopilot import VehicleState
@@ -21,23 +21,25 @@ class LiveCamera:
     given the telemetry when it is not None.
     """
 
-    def __init__(self, source: str, plan: CameraPlan) -> None:
+    def __init__(self, source: str, plan: CameraPlan, camera: Intrinsics) -> None:
         self.clock = ScaledClock()
         self.feed_pose: Callable[[VehicleState], None] | None = None
         self._close: Callable[[], None] = lambda: None
         self.open_camera: Callable[[], Camera]
         if source.startswith(SIM_PREFIX):
-            self._hang_on_telemetry(source.removeprefix(SIM_PREFIX), plan)
+            self._hang_on_telemetry(source.removeprefix(SIM_PREFIX), camera, plan.rate_hz)
         else:
             parse_spec(source)  # a misspelt one is told now, not by the worker in the middle of getting ready
-            settings = CameraSettings(plan.width_px, plan.height_px, plan.rate_hz)
+            settings = CameraSettings(
+                plan.width_px, plan.height_px, plan.rate_hz, plan.pixel_format, tuple(plan.controls.items())
+            )
             self.open_camera = functools.partial(open_camera, source, settings, self.clock)
 
-    def _hang_on_telemetry(self, world: str, plan: CameraPlan) -> None:
+    def _hang_on_telemetry(self, world: str, intrinsics: Intrinsics, rate_hz: float) -> None:
         from mission.simulation import TelemetryCamera, WorldError, world_path_or_name
 
         try:
-            camera = TelemetryCamera(world_path_or_name(world or None), self.clock, plan)
+            camera = TelemetryCamera(world_path_or_name(world or None), self.clock, intrinsics, rate_hz)
         except WorldError as error:
             raise CameraError(str(error)) from None
         self._close = camera.close

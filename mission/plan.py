@@ -143,7 +143,29 @@ class CameraPlan(_Section):
     width_px: int = Field(640, ge=64, le=4096)
     height_px: int = Field(480, ge=64, le=4096)
     rate_hz: float = Field(30.0, gt=0, le=120)
-    hfov_deg: float = Field(80.0, ge=10, le=150, description="Horizontal field of view of the undistorted image.")
+    hfov_deg: float = Field(
+        80.0, ge=10, le=150, description="Horizontal field of view of a lens that keeps straight lines straight."
+    )
+    calibration: str | None = Field(
+        None,
+        min_length=1,
+        description="A file from lineflight camera calibrate, beside this one or with its path; replaces hfov_deg.",
+    )
+    pixel_format: str | None = Field(
+        None, pattern=r"^[A-Z0-9 ]{4}$", description="V4L2 only: YUYV, MJPG, ...; by default what is fast enough."
+    )
+    controls: dict[str, int] = Field(
+        {},
+        max_length=50,
+        description="V4L2 only: controls to set, in this order, by the names of lineflight camera show, e.g. "
+        "{auto_exposure: 1, exposure_time_absolute: 20}.",
+    )
+
+    @model_validator(mode="after")
+    def _calibration_tells_the_field_of_view(self) -> Self:
+        if self.calibration is not None and "hfov_deg" in self.model_fields_set:
+            raise PydanticCustomError("two_lenses", "either calibration or hfov_deg, not both")
+        return self
 
 
 class VisionPlan(_Section):

@@ -8,6 +8,8 @@ from pathlib import Path
 from pydantic import BaseModel, ValidationError
 from pydantic_core import ErrorDetails
 
+from drivers.camera.camera import CameraError, Intrinsics
+from mission.camera_plan import planned_camera
 from mission.plan import TASK_MODELS, MissionPlan, SafetyPlan
 from mission.plan_rules import check_rules
 from mission.yaml_document import Document, DocumentError, Location, Problem, key_path, parse_document
@@ -39,11 +41,12 @@ class MissionFileError(Exception):
 
 @dataclass(frozen=True, slots=True)
 class MissionFile:
-    """A mission file that was read: the plan, and the text that the log keeps."""
+    """A mission file that was read: the plan, the text that the log keeps, and the camera that the plan means."""
 
     path: Path
     text: str
     plan: MissionPlan
+    camera: Intrinsics
 
 
 def read_mission(path: Path) -> MissionFile:
@@ -65,7 +68,12 @@ def read_mission(path: Path) -> MissionFile:
         raise MissionFileError(path, _merge_alternatives(found) + problems) from None
     if problems:
         raise MissionFileError(path, problems)
-    return MissionFile(path, text, plan)
+    try:
+        camera = planned_camera(plan.camera, path.parent)
+    except CameraError as error:
+        at = ("camera", "calibration")
+        raise MissionFileError(path, [Problem(document.line(at), key_path(at), str(error))]) from None
+    return MissionFile(path, text, plan, camera)
 
 
 def schema_text() -> str:

@@ -2,7 +2,6 @@
 
 import contextlib
 import functools
-import math
 import multiprocessing
 import os
 import signal
@@ -18,10 +17,9 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from drivers.camera.camera import Camera, CameraSettings
+from drivers.camera.camera import Camera, Intrinsics
 from drivers.clock import ScaledClock
 from mission.autopilot import VehicleState
-from mission.plan import CameraPlan
 from mission.records import TrueLine, TruePose
 from sitl.camera import SimCamera
 from sitl.control import quaternion_of
@@ -64,9 +62,9 @@ class Simulation:
         """Where MAVSDK finds the vehicle."""
         return f"udpin://127.0.0.1:{self._port}"
 
-    def camera_opener(self, plan: CameraPlan) -> Callable[[], Camera]:
+    def camera_opener(self, camera: Intrinsics, rate_hz: float) -> Callable[[], Camera]:
         """What opens the simulated camera in the vision worker."""
-        return sim_camera_opener(self._world_name, self._poses.name, self._clock, plan, self._seed)
+        return sim_camera_opener(self._world_name, self._poses.name, self._clock, camera, rate_hz, self._seed)
 
     def true_pose(self) -> TruePose | None:
         """Where the vehicle truly is; None before the first step."""
@@ -99,10 +97,10 @@ class TelemetryCamera:
     The autopilot's local origin is taken for the world's, and its estimate for the truth.
     """
 
-    def __init__(self, world: str | None, clock: ScaledClock, plan: CameraPlan) -> None:
+    def __init__(self, world: str | None, clock: ScaledClock, camera: Intrinsics, rate_hz: float) -> None:
         load_world(world)
         self._poses = PoseBlock.create()
-        self.open_camera = sim_camera_opener(world, self._poses.name, clock, plan, seed=1)
+        self.open_camera = sim_camera_opener(world, self._poses.name, clock, camera, rate_hz, seed=1)
 
     def feed(self, state: VehicleState) -> None:
         """Publish the vehicle's state as the camera's pose."""
@@ -115,11 +113,10 @@ class TelemetryCamera:
 
 
 def sim_camera_opener(
-    world: str | None, pose_block: str, clock: ScaledClock, plan: CameraPlan, seed: int
+    world: str | None, pose_block: str, clock: ScaledClock, camera: Intrinsics, rate_hz: float, seed: int
 ) -> Callable[[], Camera]:
     """What opens a simulated camera that hangs on the poses of `pose_block`; picklable."""
-    settings = CameraSettings(plan.width_px, plan.height_px, plan.rate_hz)
-    return functools.partial(SimCamera, world, pose_block, clock, settings, math.radians(plan.hfov_deg), seed)
+    return functools.partial(SimCamera, world, pose_block, clock, camera, rate_hz, seed)
 
 
 def sitl_settings(

@@ -4,10 +4,10 @@ import threading
 from types import TracebackType
 from typing import Self
 
-from drivers.camera.camera import CameraError, CameraSettings, Frame
+from drivers.camera.camera import CameraError, Frame, Intrinsics
 from drivers.camera.mailbox import Mailbox
 from drivers.clock import NS_PER_S, ScaledClock
-from sitl.lens import CameraMount, pinhole
+from sitl.lens import CameraMount
 from sitl.pose import Pose, PoseBlock
 from sitl.render import Renderer
 from sitl.sensor import Optics
@@ -20,7 +20,7 @@ class SimCamera:
     """A camera on the simulated vehicle; it implements drivers.camera's Camera.
 
     `world` names the world (sitl.world.load_world), `pose_block` the shared memory that the vehicle writes its pose to.
-    Frames come at `settings.rate_hz` of the clock's flight time, as far as the rendering keeps up; those it misses
+    Frames come at `rate_hz` of the clock's flight time, as far as the rendering keeps up; those it misses
     count in `seq`. `seed` is that of the sensor's noise. Entering it paints the world and compiles, which takes
     seconds, and raises CameraError when the world or the pose block is not there.
     """
@@ -30,8 +30,8 @@ class SimCamera:
         world: str | None,
         pose_block: str,
         clock: ScaledClock,
-        settings: CameraSettings,
-        hfov_rad: float,
+        intrinsics: Intrinsics,
+        rate_hz: float,
         seed: int,
         *,
         mount: CameraMount | None = None,
@@ -40,8 +40,8 @@ class SimCamera:
         self._world = world
         self._pose_block = pose_block
         self._clock = clock
-        self._settings = settings
-        self._intrinsics = pinhole(settings.width_px, settings.height_px, hfov_rad)
+        self._intrinsics = intrinsics
+        self._rate_hz = rate_hz
         self._seed = seed
         self._mount = mount
         self._optics = optics
@@ -87,7 +87,7 @@ class SimCamera:
 
     def _grab(self, renderer: Renderer, poses: PoseBlock) -> None:
         """Render a frame at each frame time that is not over yet; runs in the grabber thread until told to stop."""
-        period_ns = NS_PER_S / self._settings.rate_hz
+        period_ns = NS_PER_S / self._rate_hz
         start_ns = self._clock.now_ns()
         seq = 0
         try:

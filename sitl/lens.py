@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from drivers.camera.camera import Intrinsics
 from sitl.pose import Pose
 
+_WIDEST_RAD = math.radians(80.0)
+
 
 def pinhole(width_px: int, height_px: int, hfov_rad: float) -> Intrinsics:
     """The undistorted camera of that image size [px] and horizontal field of view [rad], its axis at the centre.
@@ -70,21 +72,41 @@ def camera_pose(pose: Pose, mount: CameraMount) -> tuple[NDArray[np.float64], ND
 
 
 def ray_table(intrinsics: Intrinsics) -> NDArray[np.float32]:
-    """What each pixel looks along: (2, height, width) float32, x and y of its ray at z = 1 in the camera frame."""
+    """What each pixel looks along: (2, height, width) float32, x and y of its ray at z = 1 in the camera frame.
+
+    Rays further than 80 degrees off the axis, which a fisheye lens has, are drawn at 80 degrees.
+    """
     u, v = np.meshgrid(np.arange(intrinsics.width_px), np.arange(intrinsics.height_px))
     x = (u - intrinsics.cx_px) / intrinsics.fx_px
     y = (v - intrinsics.cy_px) / intrinsics.fy_px
-    if any(intrinsics.distortion):
+    distortion = np.array(intrinsics.distortion)
+    if intrinsics.lens == "fisheye":
+        radius = np.hypot(x, y)
+        angle = _undistorted_angle(radius, distortion)
+        scale = np.tan(np.minimum(angle, _WIDEST_RAD)) / np.maximum(radius, 1e-12)
+        x, y = x * scale, y * scale
+    elif intrinsics.is_distorted:
         points = np.stack([x, y], axis=-1).reshape(-1, 1, 2)
         criteria = (cv2.TERM_CRITERIA_COUNT | cv2.TERM_CRITERIA_EPS, 40, 1e-10)
-        straight = cv2.undistortPoints(points, np.eye(3), np.array(intrinsics.distortion), criteria=criteria)
+        straight = cv2.undistortPoints(points, np.eye(3), distortion, criteria=criteria)
         x, y = np.asarray(straight, dtype=np.float64).reshape(*u.shape, 2).transpose(2, 0, 1)
     return np.ascontiguousarray(np.stack([x, y]), dtype=np.float32)
 
 
+def _undistorted_angle(radius: NDArray[np.float64], distortion: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The angle off the axis [rad] that a fisheye lens images at a radius (in focal lengths), by interpolation."""
+    angles = np.linspace(0.0, _WIDEST_RAD, 4096)
+    t2 = angles**2
+    k1, k2, k3, k4 = distortion
+    radii = angles * (1 + t2 * (k1 + t2 * (k2 + t2 * (k3 + t2 * k4))))
+    return np.interp(radius, radii, angles)
+
+
 def lens_vector(intrinsics: Intrinsics) -> NDArray[np.float64]:
-    """fx, fy, cx, cy [px], k1, k2, p1, p2, k3 as (9,) float64: what the compiled kernels take of the intrinsics."""
-    return np.array(
-        [intrinsics.fx_px, intrinsics.fy_px, intrinsics.cx_px, intrinsics.cy_px, *intrinsics.distortion],
-        dtype=np.float64,
-    )
+    """What the compiled kernels take of the intrinsics: (10,) float64.
+
+    fx, fy, cx, cy [px], five coefficients (k1 k2 p1 p2 k3, or k1 k2 k3 k4 0), and whether the lens is a fisheye.
+    """
+    coefficients = (*intrinsics.distortion, 0.0)[:5]
+    focal = (intrinsics.fx_px, intrinsics.fy_px, intrinsics.cx_px, intrinsics.cy_px)
+    return np.array([*focal, *coefficients, float(intrinsics.lens == "fisheye")], dtype=np.float64)

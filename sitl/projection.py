@@ -17,6 +17,13 @@ def project_point(x: float, y: float, z: float, lens: NDArray[np.float64]) -> tu
     """Project a camera-frame point [m], z > 0, to pixels; `lens` is sitl.lens.lens_vector's."""
     a, b = x / z, y / z
     r2 = a * a + b * b
+    if lens[9] != 0.0:
+        r = math.sqrt(r2)
+        angle = math.atan(r)
+        t2 = angle * angle
+        bent = angle * (1.0 + t2 * (lens[4] + t2 * (lens[5] + t2 * (lens[6] + t2 * lens[7]))))
+        scale = bent / r if r > 1e-9 else 1.0
+        return lens[0] * a * scale + lens[2], lens[1] * b * scale + lens[3]
     radial = 1.0 + r2 * (lens[4] + r2 * (lens[5] + r2 * lens[8]))
     da = a * radial + 2.0 * lens[6] * a * b + lens[7] * (r2 + 2.0 * a * a)
     db = b * radial + lens[6] * (r2 + 2.0 * b * b) + 2.0 * lens[7] * a * b
@@ -111,7 +118,7 @@ def draw_members(
     p, q, axis, lateral = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
     point, sight = np.empty(3), np.empty(3)
     strip, shading, edges = np.empty(6), np.zeros(6), np.empty((2, 2))
-    is_bent = lens[4] != 0.0 or lens[5] != 0.0 or lens[6] != 0.0 or lens[7] != 0.0 or lens[8] != 0.0
+    is_bent = lens[4] != 0.0 or lens[5] != 0.0 or lens[6] != 0.0 or lens[7] != 0.0 or lens[8] != 0.0 or lens[9] != 0.0
 
     n_seen = 0
     for k in range(members.shape[0]):

@@ -7,11 +7,13 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from drivers.camera.camera import Intrinsics
 from vision.checks import check_shares
 from vision.conductors import Conductor, find_conductors
 from vision.edge_lines import ProjectionFinder, ProjectionSettings
 from vision.edges import to_grey
 from vision.finders import BaselineFinder, CbsFinder, CbsSettings, EdgeLineFinder, EdgeSettings, LinkSettings
+from vision.lens import LensCorrection
 from vision.line_group import abreast, choose_group, middle_offset_px, spacing_px
 from vision.orientation import main_angle_rad, mean_line_angle_rad, segment_angles_rad
 from vision.records import Detection, Segments
@@ -23,11 +25,15 @@ Detector = Literal["projection", "cbs", "hough", "lsd", "edlines"]
 class VisionSettings:
     """What can be tuned in the line finder. What ends in `_share` is a share of the frame's diagonal.
 
+    `camera` is the calibrated camera whose frames are looked at, which must be of its size; None takes the lens for one
+    that keeps straight lines straight.
+
     The defaults serve 640x480 nadir frames with conductors about 1 px wide as well as photographs from nearby. Raises
     ValueError for a value that cannot work.
     """
 
     detector: Detector = "projection"
+    camera: Intrinsics | None = None
     projection: ProjectionSettings = field(default_factory=ProjectionSettings)
     edges: EdgeSettings = field(default_factory=EdgeSettings)
     search: CbsSettings = field(default_factory=CbsSettings)
@@ -68,10 +74,14 @@ class LineFinder:
     def __init__(self, settings: VisionSettings) -> None:
         self._settings = settings
         self._edge_finder = make_edge_finder(settings)
+        camera = settings.camera
+        self._lens = LensCorrection(camera) if camera is not None and camera.is_distorted else None
 
     def warm_up(self) -> None:
         """Compile every kernel, or load it from its cache, so that no frame in flight waits for the compiler."""
-        colour = np.full((96, 96, 3), 60, dtype=np.uint8)
+        camera = self._settings.camera
+        size = (96, 96) if camera is None else (camera.height_px, camera.width_px)
+        colour = np.full((*size, 3), 60, dtype=np.uint8)
         colour[:, 40:43] = 220
         grey = np.ascontiguousarray(colour[:, :, 0])
         # To the compiler an array that must not be written to is another type, and cameras give those.
@@ -83,10 +93,13 @@ class LineFinder:
     def find(self, image: NDArray[np.uint8]) -> Detection:
         """Find the power lines in `image`, (h, w) grey or (h, w, 3) BGR uint8, of any size from 1x1 on.
 
-        The same image gives the same answer. Raises ValueError only for what is no such image.
+        The same image gives the same answer. Raises ValueError only for what is no such image, or is not of the
+        calibrated camera's size where its lens is to be corrected.
         """
-        settings = self._settings
+        settings, lens = self._settings, self._lens
         grey = to_grey(image)
+        if lens is not None:
+            grey = lens.straighten(grey)
         shape = (grey.shape[0], grey.shape[1])
         diagonal_px = math.hypot(*shape)
         edges = self._edge_finder.find(grey)
@@ -98,6 +111,8 @@ class LineFinder:
             settings.min_coherence,
         )
         conductors = [c for c in conductors if c.contrast >= settings.min_contrast]
+        if lens is not None:
+            conductors = lens.correct_axes(conductors)
         group, peak_rad = choose_group(
             conductors,
             settings.main_angle_tolerance_rad,
@@ -106,12 +121,15 @@ class LineFinder:
         )
         power_lines = np.array([edge for conductor in group for edge in conductor.edges]).reshape(-1, 4)
         power_lines.setflags(write=False)
+        segments = edges.segments
+        if lens is not None:
+            segments, power_lines = lens.in_frame(segments), lens.in_frame(power_lines)
         if peak_rad is None:
             # Without a conductor the longest edges say which way the image runs.
             weights = (edges.coherence * edges.covered_px) ** 2
             peak_rad = main_angle_rad(segment_angles_rad(edges.segments), weights)
-            return Detection(edges.segments, power_lines, peak_rad, 0.0, 0, None, 0.0, False)
-        return self._judge(edges.segments, power_lines, group, shape)
+            return Detection(segments, power_lines, peak_rad, 0.0, 0, None, 0.0, False)
+        return self._judge(segments, power_lines, group, shape)
 
     def _judge(
         self,

@@ -6,7 +6,8 @@ from dataclasses import replace
 import pytest
 
 from mission.autopilot import FlightMode, LandedState, VehicleState
-from mission.build import guidance_settings, pinhole_intrinsics
+from mission.build import guidance_settings
+from mission.camera_plan import pinhole_intrinsics
 from mission.eyes import GroupSize, StateHistory, sight_of
 from mission.plan import CameraPlan, GuidancePlan
 from tests.support.geometric_eyes import bare_report

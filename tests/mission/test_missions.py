@@ -8,7 +8,7 @@ from collections.abc import Callable
 import pytest
 
 from mission.autopilot import LandedState, Setpoint, VehicleState
-from mission.build import pinhole_intrinsics
+from mission.camera_plan import pinhole_intrinsics
 from mission.executive import Executive
 from mission.plan import MissionPlan, VehiclePlan
 from mission.records import Result, TaskEnded, TaskStarted

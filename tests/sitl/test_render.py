@@ -25,6 +25,7 @@ from sitl.world import Conductor, World, load_world
 FLAWLESS = Optics(blur_px=0.0, corner_light=1.0, read_noise=0.0, shot_noise=0.0)
 CAMERA = pinhole(320, 240, math.radians(70.0))
 BENT = dataclasses.replace(CAMERA, distortion=(-0.22, 0.06, 0.001, -0.0005, 0.0))
+FISHEYE = Intrinsics(320, 240, 160.0, 161.0, 158.0, 121.0, (-0.03, 0.006, -0.004, 0.001), "fisheye")
 
 
 @functools.cache
@@ -84,7 +85,7 @@ def test_a_conductor_thinner_than_a_pixel_adds_its_true_light(heading_deg: float
 
 def test_the_line_is_seen_where_it_is_projected() -> None:
     """Bright ridges run along the projected conductors, also through a bent lens and a tilted camera."""
-    for camera in (CAMERA, BENT):
+    for camera in (CAMERA, BENT, FISHEYE):
         renderer = Renderer(world(), camera, optics=FLAWLESS)
         pose = over_the_line(15.0, 75.0, math.radians(-9.0), math.radians(7.0))
         image = linear(renderer.render(pose, 0)).mean(axis=2).astype(np.float32)
@@ -127,8 +128,11 @@ def test_the_image_hangs_together_with_the_vehicle() -> None:
     north_m=st.floats(-30, 30), yaw_rad=st.floats(-3, 3), pitch_rad=st.floats(-0.4, 0.4), roll_rad=st.floats(-0.4, 0.4)
 )
 @settings(deadline=None, max_examples=40)
-def test_rays_and_projection_are_inverse(north_m: float, yaw_rad: float, pitch_rad: float, roll_rad: float) -> None:
-    rays = ray_table(BENT)
+@pytest.mark.parametrize("camera", [BENT, FISHEYE], ids=["bent", "fisheye"])
+def test_rays_and_projection_are_inverse(
+    camera: Intrinsics, north_m: float, yaw_rad: float, pitch_rad: float, roll_rad: float
+) -> None:
+    rays = ray_table(camera)
     centre, ned_from_camera = camera_pose(
         Pose(0, north_m, 2.0, -14.0, turned(yaw_rad, pitch_rad, roll_rad)), CameraMount((0.1, 0.0, 0.05))
     )
@@ -136,7 +140,7 @@ def test_rays_and_projection_are_inverse(north_m: float, yaw_rad: float, pitch_r
         ray = ned_from_camera @ np.array([*rays[:, v, u].astype(float), 1.0])
         point = centre + 7.0 * ray
         x, y, z = ned_from_camera.T @ (point - centre)
-        assert project_point(x, y, z, lens_vector(BENT)) == pytest.approx((u, v), abs=2e-3)
+        assert project_point(x, y, z, lens_vector(camera)) == pytest.approx((u, v), abs=2e-3)
 
 
 @pytest.mark.parametrize(

@@ -73,7 +73,11 @@ def test_the_compiled_strip_equals_plain_python(shading: NDArray[np.float64], st
     np.testing.assert_allclose(compiled, plain, atol=1e-6)
 
 
-@pytest.mark.parametrize("distortion", [(0.0, 0.0, 0.0, 0.0, 0.0), (-0.2, 0.03, 0.001, -0.002, 0.0)])
+@pytest.mark.parametrize(
+    "distortion",
+    [(0.0, 0.0, 0.0, 0.0, 0.0, 0.0), (-0.2, 0.03, 0.001, -0.002, 0.0, 0.0), (-0.03, 0.006, -0.004, 0.001, 0.0, 1.0)],
+    ids=["straight", "bent", "fisheye"],
+)
 @pytest.mark.parametrize("is_ribbon", [False, True])
 def test_the_compiled_members_equal_plain_python(distortion: tuple[float, ...], is_ribbon: bool) -> None:
     camera = pinhole(48, 36, 1.2)

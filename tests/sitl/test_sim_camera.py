@@ -7,12 +7,14 @@ from collections.abc import Iterator
 import numpy as np
 import pytest
 
-from drivers.camera.camera import Camera, CameraError, CameraSettings, Frame
+from drivers.camera.camera import Camera, CameraError, Frame, Intrinsics
 from drivers.clock import ScaledClock
 from sitl.camera import SimCamera
+from sitl.lens import pinhole
 from sitl.pose import Pose, PoseBlock
 
-SETTINGS = CameraSettings(width_px=160, height_px=120, rate_hz=200.0)
+INTRINSICS = pinhole(160, 120, math.radians(70.0))
+RATE_HZ = 200.0
 LEVEL = (1.0, 0.0, 0.0, 0.0)
 WAIT_S = 30.0
 
@@ -24,8 +26,8 @@ def poses() -> Iterator[PoseBlock]:
     block.close()
 
 
-def camera_on(poses: PoseBlock, settings: CameraSettings = SETTINGS) -> SimCamera:
-    return SimCamera(None, poses.name, ScaledClock(), settings, math.radians(70.0), seed=1)
+def camera_on(poses: PoseBlock, intrinsics: Intrinsics = INTRINSICS, rate_hz: float = RATE_HZ) -> SimCamera:
+    return SimCamera(None, poses.name, ScaledClock(), intrinsics, rate_hz, seed=1)
 
 
 def next_frame(camera: Camera) -> Frame:
@@ -60,7 +62,7 @@ def test_frames_show_the_newest_pose(poses: PoseBlock) -> None:
 def test_frames_missed_by_the_reader_and_by_the_renderer_count(poses: PoseBlock) -> None:
     """At 100 kHz no renderer keeps up: the numbers must tell of the frames that were never made."""
     poses.write(Pose(1, 0.0, 0.0, -5.0, LEVEL))
-    with camera_on(poses, CameraSettings(64, 48, 100_000.0)) as camera:
+    with camera_on(poses, pinhole(64, 48, math.radians(70.0)), 100_000.0) as camera:
         seqs = [next_frame(camera).seq for _ in range(4)]
     assert all(later - earlier > 1 for earlier, later in itertools.pairwise(seqs))
 
@@ -83,7 +85,7 @@ def test_it_can_be_entered_again_and_ends_when_left(poses: PoseBlock) -> None:
 
 
 def test_a_missing_vehicle_is_a_sentence() -> None:
-    camera = SimCamera(None, "no_such_block", ScaledClock(), SETTINGS, 1.2, seed=1)
+    camera = SimCamera(None, "no_such_block", ScaledClock(), INTRINSICS, RATE_HZ, seed=1)
     with pytest.raises(CameraError, match="no_such_block") as caught, camera:
         pass
     assert str(caught.value).endswith(".")
@@ -92,6 +94,6 @@ def test_a_missing_vehicle_is_a_sentence() -> None:
 def test_a_missing_world_is_a_sentence(poses: PoseBlock) -> None:
     with (
         pytest.raises(CameraError, match="atlantis"),
-        SimCamera("atlantis", poses.name, ScaledClock(), SETTINGS, 1.2, 1),
+        SimCamera("atlantis", poses.name, ScaledClock(), INTRINSICS, RATE_HZ, 1),
     ):
         pass

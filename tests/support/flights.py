@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from mission.autopilot import Setpoint
-from mission.build import pinhole_intrinsics
+from mission.camera_plan import pinhole_intrinsics
 from mission.executive import Executive
 from mission.plan import MissionPlan
 from mission.plan_file import read_mission
