@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Annotated, Literal, NoReturn
 
 import typer
 
+from mission.camera_commands import app as camera_app
 from mission.log.errors import LogError
 
 if TYPE_CHECKING:
@@ -38,6 +39,8 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
+
+app.add_typer(camera_app, name="camera")
 
 MissionArgument = Annotated[Path, typer.Argument(help="The mission file (YAML); missions/ holds examples.")]
 SpeedOption = Annotated[float, typer.Option(min=0.1, max=20, help="Times faster than real time.")]

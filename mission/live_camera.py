@@ -30,9 +30,7 @@ class LiveCamera:
             self._hang_on_telemetry(source.removeprefix(SIM_PREFIX), camera, plan.rate_hz)
         else:
             parse_spec(source)  # a misspelt one is told now, not by the worker in the middle of getting ready
-            settings = CameraSettings(
-                plan.width_px, plan.height_px, plan.rate_hz, plan.pixel_format, tuple(plan.controls.items())
-            )
+            settings = camera_settings(plan)
             self.open_camera = functools.partial(open_camera, source, settings, self.clock)
 
     def _hang_on_telemetry(self, world: str, intrinsics: Intrinsics, rate_hz: float) -> None:
@@ -55,4 +53,9 @@ class LiveCamera:
         self._close()
 
 
-__all__ = ["CameraError", "LiveCamera"]
+def camera_settings(plan: CameraPlan) -> CameraSettings:
+    """What a mission's camera section asks of a camera."""
+    return CameraSettings(plan.width_px, plan.height_px, plan.rate_hz, plan.pixel_format, tuple(plan.controls.items()))
+
+
+__all__ = ["CameraError", "LiveCamera", "camera_settings"]

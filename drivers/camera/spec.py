@@ -7,7 +7,7 @@ from drivers.camera.recorded import open_recording
 from drivers.camera.v4l2 import open_v4l2
 from drivers.clock import ScaledClock
 
-ALLOWED_SPECS = "v4l2:DEVICE (v4l2:/dev/video0) or file:PATH (a video, an image, or a folder of images)"
+ALLOWED_SPECS = "v4l2:DEVICE (v4l2:/dev/video0) or file:PATH (a video, an image, a folder of images, or a flight log)"
 
 
 def parse_spec(spec: str) -> tuple[str, Path]:

@@ -12,6 +12,7 @@ import numpy as np
 
 from drivers.camera.camera import CameraError, CameraLost, CameraSettings, Frame
 from drivers.camera.mailbox import Mailbox
+from drivers.camera.v4l2_device import set_controls
 from drivers.clock import NS_PER_S, ScaledClock
 
 # Raw first: JPEG's blocks eat conductors that are thinner than a pixel. Many USB cameras reach larger sizes at full
@@ -115,16 +116,16 @@ def open_v4l2(
 ) -> V4l2Camera:
     """Open a V4L2 device such as /dev/video0 and make it give what `settings` ask for.
 
-    `connect` makes the capture. Raises CameraError when the device is missing, busy, or gives another size or a lower
-    rate than asked for.
+    `connect` makes the capture. Raises CameraError when the device is missing, busy, gives another size or format or a
+    lower rate than asked for, or does not take a control's value.
     """
     if not device.exists():
-        raise CameraError(f"There is no camera at {device}; plug it in, or name another (ls /dev/video*).")
+        raise CameraError(f"There is no camera at {device}; plug it in, or name another (lineflight camera list).")
     capture = connect(device)
     if not capture.isOpened():
         raise CameraError(f"The camera {device} cannot be opened; end the program that uses it, or name another.")
     answers = []
-    for pixel_format in _PIXEL_FORMATS:
+    for pixel_format in _PIXEL_FORMATS if settings.pixel_format is None else (settings.pixel_format,):
         capture.set(cv2.CAP_PROP_FOURCC, cv2.VideoWriter.fourcc(*pixel_format))
         capture.set(cv2.CAP_PROP_FRAME_WIDTH, settings.width_px)
         capture.set(cv2.CAP_PROP_FRAME_HEIGHT, settings.height_px)
@@ -134,13 +135,24 @@ def open_v4l2(
             round(capture.get(cv2.CAP_PROP_FRAME_HEIGHT)),
         )
         rate_hz = capture.get(cv2.CAP_PROP_FPS)
+        given = int(capture.get(cv2.CAP_PROP_FOURCC)).to_bytes(4, "little", signed=True).decode("ascii", "replace")
         # A driver that does not know its rate says 0.
         is_fast_enough = rate_hz <= 0 or rate_hz >= settings.rate_hz * (1 - _RATE_TOLERANCE)
-        if (width_px, height_px) == (settings.width_px, settings.height_px) and is_fast_enough:
+        is_as_asked = settings.pixel_format in (None, given)
+        if (width_px, height_px) == (settings.width_px, settings.height_px) and is_fast_enough and is_as_asked:
+            try:
+                # By a file of our own: OpenCV knows only some of the controls, and rescales some of those.
+                if settings.controls:
+                    set_controls(device, settings.controls)
+            except CameraError:
+                capture.release()
+                raise
             return V4l2Camera(capture, device, settings, clock)
-        answers.append(f"{width_px} x {height_px} px at {rate_hz:g} Hz as {pixel_format}")
+        answers.append(f"{width_px} x {height_px} px at {rate_hz:g} Hz as {given}")
     capture.release()
+    asked = f"{settings.width_px} x {settings.height_px} px at {settings.rate_hz:g} Hz"
+    asked += "" if settings.pixel_format is None else f" as {settings.pixel_format}"
     raise CameraError(
-        f"The camera {device} was asked for {settings.width_px} x {settings.height_px} px at {settings.rate_hz:g} Hz "
-        f"but gives {' and '.join(answers)}; ask for what it has (v4l2-ctl --list-formats-ext -d {device})."
+        f"The camera {device} was asked for {asked} but gives {' and '.join(answers)}; ask for what it has "
+        f"(lineflight camera show v4l2:{device})."
     )

@@ -6,6 +6,7 @@ from typing import Any
 from pydantic import TypeAdapter
 
 from drivers.clock import NS_PER_S
+from drivers.mcap_stream import IMAGE_TOPIC
 from mission.autopilot import VehicleState
 from mission.log.records import LoggedMission, SentSetpoint, StatusText, VisionEntry
 from mission.records import Event, MissionEnded, TaskEnded, TaskStarted, TrueLine, TruePose
@@ -52,7 +53,7 @@ RECORD_CHANNELS = (
     RecordChannel("/truth/line", TrueLine, "the simulated power line", "once"),
 )
 
-IMAGE = FoxgloveChannel("/camera", "foxglove.CompressedImage", "the camera's frames as JPEG", "the log's frame rate")
+IMAGE = FoxgloveChannel(IMAGE_TOPIC, "foxglove.CompressedImage", "the camera's frames as JPEG", "the log's frame rate")
 ANNOTATIONS = FoxgloveChannel(
     "/camera/lines", "foxglove.ImageAnnotations", "the power lines found on a frame, at its time", "with each frame"
 )

@@ -7,10 +7,13 @@ import numpy as np
 import pytest
 
 from drivers.camera.camera import CameraError, CameraSettings, Frame
-from drivers.camera.recorded import ImageFiles, RecordedCamera, open_recording
+from drivers.camera.recorded import ImageFiles, LoggedImages, RecordedCamera, open_recording
 from drivers.camera.scripted import ScriptedCamera
 from drivers.camera.spec import open_camera
 from drivers.clock import NS_PER_S, ScaledClock
+from drivers.mcap_stream import MAGIC
+from mission.log.reader import read_flight
+from tests.log.synthetic_flight import HEIGHT_PX, WIDTH_PX, fly, write_log
 
 SETTINGS = CameraSettings(width_px=64, height_px=48, rate_hz=10.0)
 PERIOD_NS = NS_PER_S // 10
@@ -164,3 +167,64 @@ def test_a_scripted_camera_plays_its_script_and_ends() -> None:
         with pytest.raises(EOFError):
             camera.read(9.0)
     assert not camera.is_open
+
+
+@pytest.fixture(scope="module")
+def flight_log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("logs") / "flight.mcap"
+    write_log(path, list(fly()))
+    return path
+
+
+LOG_SETTINGS = CameraSettings(WIDTH_PX, HEIGHT_PX, 30.0)
+
+
+def test_a_flight_log_plays_the_frames_it_kept(flight_log: Path) -> None:
+    kept = [report for report in read_flight(flight_log, with_images=True).reports if report.jpeg is not None]
+    clock = VirtualClock()
+    with RecordedCamera(LoggedImages(flight_log), LOG_SETTINGS, clock, clock.sleep) as camera:
+        for report in kept:
+            frame = camera.read(1.0)
+            assert frame is not None
+            expected = cv2.imdecode(np.frombuffer(report.jpeg or b"", np.uint8), cv2.IMREAD_COLOR)
+            np.testing.assert_array_equal(frame.image, expected)
+        with pytest.raises(EOFError):
+            camera.read(1.0)
+
+
+def test_a_flight_log_plays_at_the_rate_it_was_kept_at(flight_log: Path) -> None:
+    kept = [report for report in read_flight(flight_log, with_images=True).reports if report.jpeg is not None]
+    period_ns = np.median(np.diff([report.t_capture_ns for report in kept]))
+    clock = VirtualClock()
+    with open_recording(flight_log, LOG_SETTINGS, clock) as camera:
+        camera._sleep = clock.sleep
+        first, second = camera.read(10.0), camera.read(10.0)
+    assert first is not None
+    assert second is not None
+    assert second.t_capture_ns - first.t_capture_ns == pytest.approx(period_ns, rel=0.01)
+
+
+def test_a_log_that_was_cut_off_plays_as_far_as_it_goes(flight_log: Path, tmp_path: Path) -> None:
+    whole = flight_log.read_bytes()
+    cut = tmp_path / "cut.mcap"
+    cut.write_bytes(whole[: len(whole) * 2 // 3])
+    clock = VirtualClock()
+    with RecordedCamera(LoggedImages(cut), LOG_SETTINGS, clock, clock.sleep) as camera:
+        assert camera.read(1.0) is not None
+        with pytest.raises(EOFError):
+            read_to_the_end(camera)
+
+
+def read_to_the_end(camera: RecordedCamera) -> None:
+    while True:
+        camera.read(1.0)
+
+
+@pytest.mark.parametrize(
+    ("body", "words"), [(b"", "not an MCAP file"), (b"not a log", "not an MCAP file"), (MAGIC, "holds no frames")]
+)
+def test_what_is_no_log_with_frames_is_refused(tmp_path: Path, body: bytes, words: str) -> None:
+    file = tmp_path / "flight.mcap"
+    file.write_bytes(body)
+    with pytest.raises(CameraError, match=words):
+        open_recording(file, LOG_SETTINGS, VirtualClock())

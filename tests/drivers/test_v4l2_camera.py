@@ -41,7 +41,11 @@ class FakeCapture:
     def get(self, propId: int) -> float:  # noqa: N803
         if propId == cv2.CAP_PROP_POS_MSEC:
             return self.stamp_ms
-        width_px, height_px, rate_hz = self.modes[self.pixel_format]
+        # As a driver does: a format that it has not is answered with one that it has.
+        given = self.pixel_format if self.pixel_format in self.modes else next(iter(self.modes))
+        if propId == cv2.CAP_PROP_FOURCC:
+            return cv2.VideoWriter.fourcc(*given)
+        width_px, height_px, rate_hz = self.modes[given]
         return {
             cv2.CAP_PROP_FRAME_WIDTH: width_px,
             cv2.CAP_PROP_FRAME_HEIGHT: height_px,
@@ -140,6 +144,25 @@ def test_a_camera_of_another_size_is_refused_with_what_it_has(device: Path) -> N
     capture = FakeCapture({"YUYV": (640, 480, 30.0), "MJPG": (640, 480, 60.0)})
     with pytest.raises(CameraError, match="asked for 64 x 48 px at 30 Hz but gives 640 x 480 px at 30 Hz as YUYV and"):
         open_fake(capture, device)
+    assert capture.is_released.is_set()
+
+
+def test_a_pixel_format_that_is_asked_for_is_the_only_one_taken(device: Path) -> None:
+    settings = CameraSettings(64, 48, 30.0, pixel_format="MJPG")
+    capture = FakeCapture({"YUYV": (64, 48, 30.0), "MJPG": (64, 48, 30.0)})
+    open_v4l2(device, settings, ScaledClock(), connect=lambda _: capture)
+    assert capture.pixel_format == "MJPG"
+    lacking = FakeCapture({"YUYV": (64, 48, 30.0)})
+    with pytest.raises(CameraError, match="at 30 Hz as MJPG but gives 64 x 48 px at 30 Hz as YUYV;"):
+        open_v4l2(device, settings, ScaledClock(), connect=lambda _: lacking)
+    assert lacking.is_released.is_set()
+
+
+def test_a_control_that_the_camera_has_not_is_refused(device: Path) -> None:
+    capture = FakeCapture({"YUYV": (64, 48, 30.0)})
+    settings = CameraSettings(64, 48, 30.0, controls=(("exposure_time_absolute", 20),))
+    with pytest.raises(CameraError, match="has no control 'exposure_time_absolute'"):
+        open_v4l2(device, settings, ScaledClock(), connect=lambda _: capture)
     assert capture.is_released.is_set()
 
 
