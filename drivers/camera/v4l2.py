@@ -138,7 +138,9 @@ def open_v4l2(
         is_fast_enough = rate_hz <= 0 or rate_hz >= settings.rate_hz * (1 - _RATE_TOLERANCE)
         if (width_px, height_px) == (settings.width_px, settings.height_px) and is_fast_enough:
             return V4l2Camera(capture, device, settings, clock)
-        answers.append(f"{width_px} x {height_px} px at {rate_hz:g} Hz as {pixel_format}")
+        # Asked for a format that the camera lacks, OpenCV takes one of its own choice.
+        given = (int(capture.get(cv2.CAP_PROP_FOURCC)) & 0xFFFFFFFF).to_bytes(4, "little").decode(errors="replace")
+        answers.append(f"{width_px} x {height_px} px at {rate_hz:g} Hz as {given}")
     capture.release()
     raise CameraError(
         f"The camera {device} was asked for {settings.width_px} x {settings.height_px} px at {settings.rate_hz:g} Hz "

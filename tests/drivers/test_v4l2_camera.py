@@ -46,6 +46,7 @@ class FakeCapture:
             cv2.CAP_PROP_FRAME_WIDTH: width_px,
             cv2.CAP_PROP_FRAME_HEIGHT: height_px,
             cv2.CAP_PROP_FPS: rate_hz,
+            cv2.CAP_PROP_FOURCC: cv2.VideoWriter.fourcc(*self.pixel_format),
         }[propId]
 
     def grab(self) -> bool:
