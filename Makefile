@@ -4,14 +4,18 @@ VENV := .venv
 BIN := $(VENV)/bin
 MISSION ?= missions/follow_line.yaml
 FLY ?= --speed 1.5
+PYTEST ?=
 
-.PHONY: fly test check bench bench-vision schema clean
+.PHONY: fly test test-v4l2 check bench bench-vision schema clean
 
 fly: $(VENV)/.installed
 	$(BIN)/lineflight dry-run $(MISSION) $(FLY)
 
 test: $(VENV)/.installed-dev
 	$(BIN)/python -m pytest
+
+test-v4l2: $(VENV)/.installed-dev
+	$(BIN)/python -m tests.v4l2_guest.boot $(PYTEST)
 
 check: $(VENV)/.installed-dev
 	$(BIN)/ruff check .
@@ -29,7 +33,7 @@ schema: $(VENV)/.installed
 	$(BIN)/python -c "from mission.plan_file import schema_text; print(schema_text(), end='')" > missions/mission.schema.json
 
 clean:
-	rm -rf $(VENV) .mypy_cache .pytest_cache .ruff_cache .import_linter_cache
+	rm -rf $(VENV) .v4l2-guest .mypy_cache .pytest_cache .ruff_cache .import_linter_cache
 	find . -name __pycache__ -prune -exec rm -rf {} +
 
 $(VENV)/bin/python:

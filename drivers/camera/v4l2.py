@@ -92,7 +92,7 @@ class V4l2Camera:
         except CameraError as error:
             self._mailbox.close(error)
         except Exception as error:  # a thread that ends silently would look like the end of a recording
-            self._mailbox.close(CameraLost(f"The camera {self._device} failed: {error}"))
+            self._mailbox.close(CameraError(f"The camera {self._device} failed: {error}"))
         finally:
             self._mailbox.close()
             self._capture.release()
@@ -135,7 +135,8 @@ def open_v4l2(
             round(capture.get(cv2.CAP_PROP_FRAME_HEIGHT)),
         )
         rate_hz = capture.get(cv2.CAP_PROP_FPS)
-        given = int(capture.get(cv2.CAP_PROP_FOURCC)).to_bytes(4, "little", signed=True).decode("ascii", "replace")
+        # Asked for a format that the camera lacks, OpenCV takes one of its own choice.
+        given = (int(capture.get(cv2.CAP_PROP_FOURCC)) & 0xFFFFFFFF).to_bytes(4, "little").decode(errors="replace")
         # A driver that does not know its rate says 0.
         is_fast_enough = rate_hz <= 0 or rate_hz >= settings.rate_hz * (1 - _RATE_TOLERANCE)
         is_as_asked = settings.pixel_format in (None, given)
