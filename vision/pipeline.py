@@ -11,12 +11,20 @@ from vision.checks import check_shares
 from vision.conductors import Conductor, find_conductors
 from vision.edge_lines import ProjectionFinder, ProjectionSettings
 from vision.edges import to_grey
-from vision.finders import BaselineFinder, CbsFinder, CbsSettings, EdgeLineFinder, EdgeSettings, LinkSettings
+from vision.finders import (
+    BaselineFinder,
+    CbsFinder,
+    CbsSettings,
+    EdgeLineFinder,
+    EdgeSettings,
+    LinkSettings,
+    SteerableSettings,
+)
 from vision.line_group import choose_group, middle_offset_px, n_abreast
 from vision.orientation import main_angle_rad, mean_line_angle_rad, segment_angles_rad
 from vision.records import Detection, Segments
 
-Detector = Literal["projection", "cbs", "hough", "lsd", "edlines"]
+Detector = Literal["projection", "cbs", "steerable", "hough", "lsd", "edlines"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +38,7 @@ class VisionSettings:
     detector: Detector = "projection"
     projection: ProjectionSettings = field(default_factory=ProjectionSettings)
     edges: EdgeSettings = field(default_factory=EdgeSettings)
+    steerable: SteerableSettings = field(default_factory=SteerableSettings)
     search: CbsSettings = field(default_factory=CbsSettings)
     linking: LinkSettings = field(default_factory=LinkSettings)
 
@@ -59,6 +68,8 @@ def make_edge_finder(settings: VisionSettings) -> EdgeLineFinder:
         return ProjectionFinder(settings.projection)
     if settings.detector == "cbs":
         return CbsFinder(settings.edges, settings.search, settings.linking)
+    if settings.detector == "steerable":
+        return CbsFinder(settings.steerable, settings.search, settings.linking)
     return BaselineFinder(settings.detector, settings.edges, settings.linking)
 
 

@@ -222,7 +222,7 @@ def test_colour_and_grey_agree(finder: LineFinder) -> None:
     assert finder.find(frame).estimate(5) == finder.find(np.repeat(frame[:, :, None], 3, axis=2)).estimate(5)
 
 
-@pytest.mark.parametrize("detector", ["projection", "cbs", "hough", "lsd", "edlines"])
+@pytest.mark.parametrize("detector", ["projection", "cbs", "steerable", "hough", "lsd", "edlines"])
 def test_every_detector_finds_a_plain_line_and_answers_anything(detector: Detector) -> None:
     finder = LineFinder(VisionSettings(detector=detector))
     frame = expose(draw_line(draw_line(np.full((480, 640), 90.0), 0.4, 40.0, 5.0, 220.0), 0.4, 90.0, 5.0, 220.0), 1)
@@ -236,7 +236,7 @@ def test_every_detector_finds_a_plain_line_and_answers_anything(detector: Detect
         assert is_honest(finder.find(np.random.default_rng(1).integers(0, 256, size, dtype=np.uint8)))
 
 
-@pytest.mark.parametrize("detector", ["projection", "cbs"])
+@pytest.mark.parametrize("detector", ["projection", "cbs", "steerable"])
 def test_no_frame_waits_for_the_compiler(detector: Detector) -> None:
     # In a process of its own: in this one other tests have compiled the kernels for every kind of image.
     command = [sys.executable, "-m", "tests.vision.count_compilations", detector]
