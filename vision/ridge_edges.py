@@ -39,9 +39,13 @@ def find_ridge_edges(
     codes = link_edges(step_x, step_y, edge_quantile, low_ratio, GRADIENT_GAIN * min_contrast)
     height, width = grey.shape[0] // _COARSENESS, grey.shape[1] // _COARSENESS
     if min_ridge > 0 and min(height, width) > 0:
-        cropped = grey[: height * _COARSENESS, : width * _COARSENESS]
-        coarse = np.asarray(cv2.resize(cropped, (width, height), interpolation=cv2.INTER_AREA), dtype=np.uint8)
-        drop_steps(codes, _respond(coarse, sigma_px), _COARSENESS, _REACH_PX, min_ridge)
+        coarse = cv2.resize(
+            grey[: height * _COARSENESS, : width * _COARSENESS], (width, height), interpolation=cv2.INTER_AREA
+        )
+        coarse = cv2.copyMakeBorder(coarse, *4 * [_REACH_PX], borderType=cv2.BORDER_REPLICATE)
+        step_x, step_y, ridges = _respond(np.asarray(coarse, dtype=np.uint8), sigma_px)
+        steps_2 = np.square(step_x, dtype=np.int32) + np.square(step_y, dtype=np.int32)
+        drop_steps(codes, steps_2, ridges, ways_across(_REACH_PX), _COARSENESS, min_ridge)
     return codes
 
 
@@ -54,29 +58,47 @@ def _respond(grey: NDArray[np.uint8], sigma_px: float) -> NDArray[np.int16]:
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
 def drop_steps(
-    codes: NDArray[np.uint8], coarse: NDArray[np.int16], coarseness: int, reach_px: int, min_ridge: float
+    codes: NDArray[np.uint8],
+    steps_2: NDArray[np.int32],
+    ridges: NDArray[np.int16],
+    across: NDArray[np.int64],
+    coarseness: int,
+    min_ridge: float,
 ) -> None:
     """Set those `codes` (h, w) to 0 that no ridge lies beside.
 
-    `coarse` is (3, h // coarseness, w // coarseness), what vision.steerable.dominant gives for the shrunk image. A
-    ridge on the brighter side has to be bright, one on the darker side dark.
+    `steps_2`, the squared steps, and `ridges` are what the shrunk image answers, with as many more pixels all around as
+    `across`, what `ways_across` gives, reaches: (h // coarseness + 2 reach, w // coarseness + 2 reach). A ridge on the
+    brighter side has to be bright, one on the darker side dark.
     """
-    height, width = coarse.shape[1:]
+    n_ways = across.shape[1]
+    reach_px = n_ways // 2
+    padded_width = ridges.shape[1]
+    last_x, last_y = padded_width - 2 * reach_px - 1, ridges.shape[0] - 2 * reach_px - 1
+    flat_2, flat_ridges = steps_2.ravel(), ridges.ravel()  # views: both are contiguous
+    offsets = across[:, :, 1] * padded_width + across[:, :, 0]
     for y in range(codes.shape[0]):
+        row = (min(y // coarseness, last_y) + reach_px) * padded_width + reach_px
         for x in range(codes.shape[1]):
-            if codes[y, x] == 0:
+            code = codes[y, x]
+            if code == 0:
                 continue
-            turn = 2.0 * math.pi * (codes[y, x] - 1) / N_DIRECTIONS
-            across_x, across_y = math.cos(turn), math.sin(turn)
-            middle_x, middle_y = x // coarseness, y // coarseness
-            step, ridge = 0.0, 0.0
-            for i in range(-reach_px, reach_px + 1):
-                xx = min(max(math.floor(middle_x + i * across_x + 0.5), 0), width - 1)
-                yy = min(max(math.floor(middle_y + i * across_y + 0.5), 0), height - 1)
-                step = max(step, math.hypot(coarse[0, yy, xx], coarse[1, yy, xx]))
-                if i >= 0:
-                    ridge = max(ridge, float(coarse[2, yy, xx]))
-                if i <= 0:
-                    ridge = max(ridge, -float(coarse[2, yy, xx]))
-            if ridge < min_ridge * step:
+            pixel = row + min(x // coarseness, last_x)
+            step_2, ridge = np.int32(0), np.int16(0)
+            for i in range(n_ways):
+                at = pixel + offsets[code - 1, i]
+                step_2 = max(step_2, flat_2[at])
+                if i >= reach_px:
+                    ridge = max(ridge, flat_ridges[at])
+                if i <= reach_px:
+                    ridge = max(ridge, -flat_ridges[at])
+            if float(ridge) * float(ridge) < min_ridge * min_ridge * float(step_2):
                 codes[y, x] = 0
+
+
+def ways_across(reach_px: int) -> NDArray[np.int64]:
+    """The pixels across an edge of each direction, from the darker to the brighter side: (64, 2 reach + 1, 2) x, y."""
+    turns_rad = 2.0 * math.pi * np.arange(N_DIRECTIONS) / N_DIRECTIONS
+    towards_bright = np.stack([np.cos(turns_rad), np.sin(turns_rad)], axis=1)
+    steps = np.arange(-reach_px, reach_px + 1)
+    return np.floor(towards_bright[:, None, :] * steps[:, None] + 0.5).astype(np.int64)

@@ -77,7 +77,7 @@ def oriented_energy(basis: NDArray[np.float32], angle_rad: float | NDArray[np.fl
     return even * even + odd * odd
 
 
-@njit(cache=True, nogil=True, fastmath=True)  # type: ignore[untyped-decorator]
+@njit(cache=True, nogil=True, fastmath=True, error_model="numpy")  # type: ignore[untyped-decorator]
 def dominant(basis: NDArray[np.float32], gain: np.float32, out: NDArray[np.int16]) -> None:
     """Write each pixel's step and ridge, at the angle where the energy is greatest, into `out`, (3, h, w) int16.
 

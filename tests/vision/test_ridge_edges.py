@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tests.vision.nadir_frames import draw_line, expose, ground
 from vision.edges import N_DIRECTIONS
-from vision.ridge_edges import drop_steps, find_ridge_edges
+from vision.ridge_edges import drop_steps, find_ridge_edges, ways_across
 
 
 def edges_of(grey: NDArray[np.uint8], min_ridge: float = 0.7) -> NDArray[np.uint8]:
@@ -56,22 +56,33 @@ def test_a_step_loses_its_edge_and_keeps_it_when_no_ridge_is_asked_for(angle_rad
 def test_a_ridge_on_the_wrong_side_saves_no_edge() -> None:
     codes = np.zeros((20, 20), dtype=np.uint8)
     codes[10, 10] = 1  # brighter to the right
-    coarse = np.zeros((3, 10, 10), dtype=np.int16)
-    coarse[0, 5, 5] = 100
-    for column, ridge, is_kept in ((6, 80, True), (4, -80, True), (6, -80, False), (4, 80, False), (6, 60, False)):
-        kept, beside = codes.copy(), coarse.copy()
-        beside[2, 5, column] = ridge
-        drop_steps(kept, beside, 2, 3, 0.7)
+    steps_2 = np.zeros((16, 16), dtype=np.int32)
+    steps_2[8, 8] = 100**2  # 3 pixels more on each side: this is pixel 5, 5
+    for column, ridge, is_kept in ((9, 80, True), (7, -80, True), (9, -80, False), (7, 80, False), (9, 60, False)):
+        kept, ridges = codes.copy(), np.zeros((16, 16), dtype=np.int16)
+        ridges[8, column] = ridge
+        drop_steps(kept, steps_2, ridges, ways_across(3), 2, 0.7)
         assert kept.any() == is_kept
+
+
+def test_ways_across_lead_from_dark_to_bright_through_the_pixel_itself() -> None:
+    ways = ways_across(3)
+    assert ways.shape == (N_DIRECTIONS, 7, 2)
+    assert not ways[:, 3].any()
+    turns_rad = 2 * math.pi * np.arange(N_DIRECTIONS) / N_DIRECTIONS
+    for i, reach_px in ((0, -3), (6, 3)):
+        wanted = reach_px * np.stack([np.cos(turns_rad), np.sin(turns_rad)], axis=1)
+        assert np.max(np.abs(ways[:, i] - wanted)) <= 0.5 + 1e-9
 
 
 def test_dropping_compiled_equals_plain_python() -> None:
     rng = np.random.default_rng(8)
     codes = (rng.integers(0, 65, (23, 31)) * (rng.random((23, 31)) < 0.5)).astype(np.uint8)
-    coarse = rng.normal(0, 100, (3, 11, 15)).astype(np.int16)
+    steps_2 = rng.integers(0, 40_000, (17, 21)).astype(np.int32)
+    ridges = rng.normal(0, 100, (17, 21)).astype(np.int16)
     compiled, plain = codes.copy(), codes.copy()
-    drop_steps(compiled, coarse, 2, 3, 1.0)
-    drop_steps.py_func(plain, coarse, 2, 3, 1.0)
+    drop_steps(compiled, steps_2, ridges, ways_across(3), 2, 0.8)
+    drop_steps.py_func(plain, steps_2, ridges, ways_across(3), 2, 0.8)
     np.testing.assert_array_equal(compiled, plain)
     assert 0 < np.count_nonzero(compiled) < np.count_nonzero(codes)
 
