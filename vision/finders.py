@@ -1,7 +1,7 @@
 """The edge line finders behind one interface: projection, the circle based search, and OpenCV's detectors to compare.
 
-All but the projection find segments first, of any length, and link them; which side of a segment is brighter is then
-read from the image.
+The circle based search takes its edges from Canny or from steerable filters. All but the projection find segments
+first, of any length, and link them; which side of a segment is brighter is then read from the image.
 """
 
 import math

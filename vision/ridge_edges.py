@@ -42,8 +42,8 @@ def find_ridge_edges(
         coarse = cv2.resize(
             grey[: height * _COARSENESS, : width * _COARSENESS], (width, height), interpolation=cv2.INTER_AREA
         )
-        coarse = cv2.copyMakeBorder(coarse, *4 * [_REACH_PX], borderType=cv2.BORDER_REPLICATE)
-        step_x, step_y, ridges = _respond(np.asarray(coarse, dtype=np.uint8), sigma_px)
+        padded = np.pad(np.asarray(coarse, dtype=np.uint8), _REACH_PX, mode="edge")  # so that no way across leaves it
+        step_x, step_y, ridges = _respond(padded, sigma_px)
         steps_2 = np.square(step_x, dtype=np.int32) + np.square(step_y, dtype=np.int32)
         drop_steps(codes, steps_2, ridges, ways_across(_REACH_PX), _COARSENESS, min_ridge)
     return codes
@@ -101,4 +101,5 @@ def ways_across(reach_px: int) -> NDArray[np.int64]:
     turns_rad = 2.0 * math.pi * np.arange(N_DIRECTIONS) / N_DIRECTIONS
     towards_bright = np.stack([np.cos(turns_rad), np.sin(turns_rad)], axis=1)
     steps = np.arange(-reach_px, reach_px + 1)
-    return np.floor(towards_bright[:, None, :] * steps[:, None] + 0.5).astype(np.int64)
+    across: NDArray[np.int64] = np.floor(towards_bright[:, None, :] * steps[:, None] + 0.5).astype(np.int64)
+    return across

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from tests.vision.nadir_frames import draw_line, expose, ground, nadir_frame
 from vision.edge_lines import ProjectionSettings
-from vision.finders import CbsSettings, EdgeSettings
+from vision.finders import CbsSettings, EdgeSettings, SteerableSettings
 from vision.orientation import line_angle_distance_rad
 from vision.pipeline import Detector, LineFinder, VisionSettings
 from vision.records import Detection, wrap_line_angle_rad
@@ -252,6 +252,8 @@ def test_no_frame_waits_for_the_compiler(detector: Detector) -> None:
         (lambda: EdgeSettings(quantile=1.5), "quantile is 1.5"),
         (lambda: EdgeSettings(low_ratio=0.0), "low_ratio is 0.0"),
         (lambda: ProjectionSettings(min_coherence=2.0), "min_coherence is 2.0"),
+        (lambda: SteerableSettings(quantile=0.0), "quantile is 0.0"),
+        (lambda: SteerableSettings(sigma_px=0.5), "sigma_px is 0.5"),
         (lambda: VisionSettings(presence_min_support=0.0), "presence_min_support is 0.0"),
     ],
 )
