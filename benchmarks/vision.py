@@ -23,7 +23,7 @@ from vision.edges import find_edges, to_grey
 from vision.orientation import line_angle_distance_rad, segment_angles_rad
 from vision.pipeline import Detector, LineFinder, VisionSettings
 
-DETECTORS: tuple[Detector, ...] = ("projection", "cbs", "hough", "lsd", "edlines")
+DETECTORS: tuple[Detector, ...] = ("projection", "cbs", "steerable", "hough", "lsd", "edlines")
 WIDTHS_PX = (333, 640, 800, 1280)
 MEGAPIXELS = (0.3, 1.0, 2.0, 4.0, 8.0)
 N_PHOTOGRAPHS = 8

@@ -48,7 +48,8 @@ SeedOption = Annotated[int, typer.Option(min=0, help="Seed of wind, sensors and 
 WindOption = Annotated[float, typer.Option(min=0, max=20, help="Mean wind [m/s], with the gusts that belong to it.")]
 WorldOption = Annotated[str | None, typer.Option(help="A world's name or file; by default medium_voltage.")]
 LogOption = Annotated[Path, typer.Option(help="The folder for logs.")]
-DetectorName = Literal["projection", "cbs", "hough", "lsd", "edlines"]  # vision.pipeline.Detector, without its import
+# vision.pipeline.Detector, without its import
+DetectorName = Literal["projection", "cbs", "steerable", "hough", "lsd", "edlines"]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON instead of tables.")]
 
 

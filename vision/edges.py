@@ -14,7 +14,9 @@ from numpy.typing import NDArray
 N_DIRECTIONS = 64
 """How many directions an edge pixel's code tells apart, over the whole turn."""
 
-_SOBEL_GAIN = 8.0  # a 3x3 Sobel kernel answers a ramp of one grey level per pixel with 8
+GRADIENT_GAIN = 8.0
+"""What a gradient's whole numbers hold for one grey level per pixel, as a 3x3 Sobel kernel answers."""
+
 _N_SAMPLES = 8000  # pixels that the gradient's quantile is taken from
 
 
@@ -55,14 +57,31 @@ def find_edges(
     """
     blurred = cv2.GaussianBlur(grey, (0, 0), blur_sigma_px) if blur_sigma_px > 0 else grey
     gradient_x, gradient_y = cv2.spatialGradient(blurred)
-    stride = max(1, math.isqrt(grey.size // _N_SAMPLES))
+    return link_edges(
+        np.asarray(gradient_x, dtype=np.int16),
+        np.asarray(gradient_y, dtype=np.int16),
+        edge_quantile,
+        low_ratio,
+        GRADIENT_GAIN * min_contrast,
+    )
+
+
+def link_edges(
+    gradient_x: NDArray[np.int16], gradient_y: NDArray[np.int16], edge_quantile: float, low_ratio: float, floor: float
+) -> NDArray[np.uint8]:
+    """Canny's second half: maxima across the gradient, hysteresis with find_edges' thresholds, and codes.
+
+    The gradient is (h, w) int16 in any unit, the one of `floor`, which the upper threshold does not go below. Returns
+    (h, w) uint8 codes as find_edges does.
+    """
+    stride = max(1, math.isqrt(gradient_x.size // _N_SAMPLES))
     sample_x = gradient_x[::stride, ::stride].astype(np.float32)
     sample_y = gradient_y[::stride, ::stride].astype(np.float32)
     magnitudes = np.hypot(sample_x, sample_y).ravel()
     rank = min(magnitudes.size - 1, int(edge_quantile * magnitudes.size))
-    high = max(_SOBEL_GAIN * min_contrast, float(np.partition(magnitudes, rank)[rank]))
+    high = max(floor, float(np.partition(magnitudes, rank)[rank]))
     edges = cv2.Canny(gradient_x, gradient_y, low_ratio * high, high, L2gradient=True)
-    codes = np.zeros(grey.shape, dtype=np.uint8)
+    codes = np.zeros(gradient_x.shape, dtype=np.uint8)
     encode_directions(np.asarray(edges, dtype=np.uint8), gradient_x, gradient_y, codes)
     return codes
 

@@ -1,7 +1,7 @@
 """The edge line finders behind one interface: projection, the circle based search, and OpenCV's detectors to compare.
 
-All but the projection find segments first, of any length, and link them; which side of a segment is brighter is then
-read from the image.
+The circle based search takes its edges from Canny or from steerable filters. All but the projection find segments
+first, of any length, and link them; which side of a segment is brighter is then read from the image.
 """
 
 import math
@@ -20,6 +20,8 @@ from vision.edge_lines import EdgeLines, edge_lines, measure_steps
 from vision.edges import find_edges
 from vision.linking import link_segments, segment_lengths_px
 from vision.records import Segments
+from vision.ridge_edges import find_ridge_edges
+from vision.steerable import basis_taps
 
 Baseline = Literal["hough", "lsd", "edlines"]
 
@@ -43,6 +45,29 @@ class EdgeSettings:
 
     def __post_init__(self) -> None:
         check_shares(self, "quantile", "low_ratio")
+
+    def find(self, grey: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """The edge codes of `grey`, both (h, w) uint8."""
+        return find_edges(grey, self.blur_sigma_px, self.quantile, self.low_ratio, self.min_contrast)
+
+
+@dataclass(frozen=True, slots=True)
+class SteerableSettings:
+    """Edges by steerable filters (vision.ridge_edges.find_ridge_edges). Raises ValueError for what cannot work."""
+
+    sigma_px: float = 1.5
+    quantile: float = 0.6
+    low_ratio: float = 0.4
+    min_contrast: float = 2.0  # grey levels per pixel
+    min_ridge: float = 0.7  # of the step; 0 keeps all edges
+
+    def __post_init__(self) -> None:
+        check_shares(self, "quantile", "low_ratio")
+        basis_taps(self.sigma_px)  # refuses what the filters cannot do
+
+    def find(self, grey: NDArray[np.uint8]) -> NDArray[np.uint8]:
+        """The edge codes of `grey`, both (h, w) uint8."""
+        return find_ridge_edges(grey, self.sigma_px, self.quantile, self.low_ratio, self.min_contrast, self.min_ridge)
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,17 +103,17 @@ class LinkSettings:
 
 
 class CbsFinder:
-    """Canny, the circle based search, linking ([Ceron] 3.2.1 and 3.3)."""
+    """Edges by Canny or by steerable filters, the circle based search, linking ([Ceron] 3.2 and 3.3)."""
 
-    def __init__(self, edges: EdgeSettings, search: CbsSettings, linking: LinkSettings) -> None:
+    def __init__(self, edges: EdgeSettings | SteerableSettings, search: CbsSettings, linking: LinkSettings) -> None:
         self._edges, self._search, self._linking = edges, search, linking
         radii_px = (search.radius_px, search.radius_px - search.radius_step_px)
         self._circles = tuple(make_circle(radius_px) for radius_px in radii_px)
 
     def find(self, grey: NDArray[np.uint8]) -> EdgeLines:
         """Find the edge lines of `grey`, (h, w) uint8 of any size."""
-        edges, search = self._edges, self._search
-        codes = find_edges(grey, edges.blur_sigma_px, edges.quantile, edges.low_ratio, edges.min_contrast)
+        search = self._search
+        codes = self._edges.find(grey)
         segments = find_segments(
             codes, self._circles, search.min_fill, search.min_walk_fill, search.skip_px, search.seed_grid_px
         )
@@ -120,9 +145,7 @@ class BaselineFinder:
         return _linked(grey, segments, self._linking)
 
     def _hough(self, grey: NDArray[np.uint8]) -> NDArray[np.float64]:
-        edges = self._edges
-        codes = find_edges(grey, edges.blur_sigma_px, edges.quantile, edges.low_ratio, edges.min_contrast)
-        binary = np.where(codes > 0, 255, 0).astype(np.uint8)
+        binary = np.where(self._edges.find(grey) > 0, 255, 0).astype(np.uint8)
         return _rows(cv2.HoughLinesP(binary, 1, math.radians(1.0), 50, minLineLength=30, maxLineGap=5))
 
     def _lsd(self, grey: NDArray[np.uint8]) -> NDArray[np.float64]:

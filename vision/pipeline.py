@@ -12,13 +12,21 @@ from vision.checks import check_shares
 from vision.conductors import Conductor, find_conductors
 from vision.edge_lines import ProjectionFinder, ProjectionSettings
 from vision.edges import to_grey
-from vision.finders import BaselineFinder, CbsFinder, CbsSettings, EdgeLineFinder, EdgeSettings, LinkSettings
+from vision.finders import (
+    BaselineFinder,
+    CbsFinder,
+    CbsSettings,
+    EdgeLineFinder,
+    EdgeSettings,
+    LinkSettings,
+    SteerableSettings,
+)
 from vision.lens import LensCorrection
 from vision.line_group import abreast, choose_group, middle_offset_px, spacing_px
 from vision.orientation import main_angle_rad, mean_line_angle_rad, segment_angles_rad
 from vision.records import Detection, Segments
 
-Detector = Literal["projection", "cbs", "hough", "lsd", "edlines"]
+Detector = Literal["projection", "cbs", "steerable", "hough", "lsd", "edlines"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,6 +44,7 @@ class VisionSettings:
     camera: Intrinsics | None = None
     projection: ProjectionSettings = field(default_factory=ProjectionSettings)
     edges: EdgeSettings = field(default_factory=EdgeSettings)
+    steerable: SteerableSettings = field(default_factory=SteerableSettings)
     search: CbsSettings = field(default_factory=CbsSettings)
     linking: LinkSettings = field(default_factory=LinkSettings)
 
@@ -65,6 +74,8 @@ def make_edge_finder(settings: VisionSettings) -> EdgeLineFinder:
         return ProjectionFinder(settings.projection)
     if settings.detector == "cbs":
         return CbsFinder(settings.edges, settings.search, settings.linking)
+    if settings.detector == "steerable":
+        return CbsFinder(settings.steerable, settings.search, settings.linking)
     return BaselineFinder(settings.detector, settings.edges, settings.linking)
 
 

@@ -117,7 +117,7 @@ def test_detect_prints_one_object_a_line_and_draws(tmp_path: Path) -> None:
     assert sorted(file.name for file in (tmp_path / "drawn").iterdir()) == ["a.png", "b.png"]
 
 
-@pytest.mark.parametrize("detector", ["cbs", "lsd"])
+@pytest.mark.parametrize("detector", ["cbs", "steerable", "lsd"])
 def test_detect_compares_detectors(tmp_path: Path, detector: str) -> None:
     draw_line_photo(tmp_path / "a.png")
     ran = lineflight("detect", tmp_path / "a.png", "--json", "--detector", detector)

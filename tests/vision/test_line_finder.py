@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from tests.vision.nadir_frames import draw_line, expose, ground, nadir_frame
 from vision.edge_lines import ProjectionSettings
-from vision.finders import CbsSettings, EdgeSettings
+from vision.finders import CbsSettings, EdgeSettings, SteerableSettings
 from vision.orientation import line_angle_distance_rad
 from vision.pipeline import Detector, LineFinder, VisionSettings
 from vision.records import Detection, wrap_line_angle_rad
@@ -222,7 +222,7 @@ def test_colour_and_grey_agree(finder: LineFinder) -> None:
     assert finder.find(frame).estimate(5) == finder.find(np.repeat(frame[:, :, None], 3, axis=2)).estimate(5)
 
 
-@pytest.mark.parametrize("detector", ["projection", "cbs", "hough", "lsd", "edlines"])
+@pytest.mark.parametrize("detector", ["projection", "cbs", "steerable", "hough", "lsd", "edlines"])
 def test_every_detector_finds_a_plain_line_and_answers_anything(detector: Detector) -> None:
     finder = LineFinder(VisionSettings(detector=detector))
     frame = expose(draw_line(draw_line(np.full((480, 640), 90.0), 0.4, 40.0, 5.0, 220.0), 0.4, 90.0, 5.0, 220.0), 1)
@@ -236,7 +236,7 @@ def test_every_detector_finds_a_plain_line_and_answers_anything(detector: Detect
         assert is_honest(finder.find(np.random.default_rng(1).integers(0, 256, size, dtype=np.uint8)))
 
 
-@pytest.mark.parametrize("detector", ["projection", "cbs"])
+@pytest.mark.parametrize("detector", ["projection", "cbs", "steerable"])
 def test_no_frame_waits_for_the_compiler(detector: Detector) -> None:
     # In a process of its own: in this one other tests have compiled the kernels for every kind of image.
     command = [sys.executable, "-m", "tests.vision.count_compilations", detector]
@@ -252,6 +252,8 @@ def test_no_frame_waits_for_the_compiler(detector: Detector) -> None:
         (lambda: EdgeSettings(quantile=1.5), "quantile is 1.5"),
         (lambda: EdgeSettings(low_ratio=0.0), "low_ratio is 0.0"),
         (lambda: ProjectionSettings(min_coherence=2.0), "min_coherence is 2.0"),
+        (lambda: SteerableSettings(quantile=0.0), "quantile is 0.0"),
+        (lambda: SteerableSettings(sigma_px=0.5), "sigma_px is 0.5"),
         (lambda: VisionSettings(presence_min_support=0.0), "presence_min_support is 0.0"),
     ],
 )
