@@ -6,14 +6,16 @@ The guest may be slow, so rates are low and what is said of time is said of the 
 import statistics
 import time
 from collections.abc import Callable, Iterator
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from drivers.camera.camera import CameraError, CameraSettings, Frame
+from drivers.camera.camera import CameraError, CameraLost, CameraSettings, Frame
 from drivers.camera.v4l2 import V4l2Camera, open_v4l2
+from drivers.camera.v4l2_device import list_devices, read_controls
 from drivers.clock import NS_PER_S, ScaledClock
 from tests.v4l2_guest import vivid
 from tests.v4l2_guest.vivid import DEVICE, Control
@@ -189,7 +191,7 @@ def test_a_lost_camera_raises_after_its_last_frame(lose: Callable[[], None]) -> 
     with open_camera() as camera:
         read(camera)
         lose()
-        with pytest.raises(CameraError, match="stopped giving frames; check its cable"):
+        with pytest.raises(CameraLost, match="stopped giving frames; check its cable"):
             read_to_the_end(camera)
 
 
@@ -200,3 +202,43 @@ def test_a_camera_that_was_unplugged_can_be_opened_anew() -> None:
     vivid.plug_in()
     with open_camera() as camera:
         assert read(camera).seq == 0
+
+
+def test_the_camera_is_listed_with_its_modes() -> None:
+    (device,) = list_devices()
+    assert (device.path, device.driver) == (DEVICE, "vivid")
+    mode = next(mode for mode in device.modes if (mode.pixel_format, mode.width_px) == ("YUYV", 640))
+    assert max(mode.rates_hz) >= 25.0
+    assert list_devices(Path("/nowhere")) == []
+
+
+def test_controls_are_set_in_order_and_change_the_image() -> None:
+    levels = []
+    for brightness in (20, 230):
+        settings = replace(SETTINGS, controls=(("gain_automatic", 0), ("brightness", brightness)))
+        with open_camera(settings) as camera:
+            levels.append(float(read(camera).image.mean()))
+            assert value_of("brightness") == brightness
+    assert levels[1] > levels[0] + 30
+
+
+def value_of(name: str) -> int | None:
+    return next(control.value for control in read_controls(DEVICE) if control.name == name)
+
+
+def test_a_control_out_of_its_range_and_an_unknown_one_are_refused() -> None:
+    for controls, words in (
+        ((("brightness", 9999),), "brightness of /dev/video0 takes 0 to 255, not 9999"),
+        ((("brightnes", 10),), "no control 'brightnes'; it has .*brightness"),
+    ):
+        with pytest.raises(CameraError, match=words):
+            open_camera(replace(SETTINGS, controls=controls))
+    with open_camera() as camera:  # the refused ones were let go
+        read(camera)
+
+
+def test_a_pixel_format_that_is_asked_for_is_given_or_refused() -> None:
+    with open_camera(replace(SETTINGS, pixel_format="UYVY")) as camera:
+        assert read(camera).image.shape == (180, 320, 3)
+    with pytest.raises(CameraError, match="as MJPG but gives 320 x 180 px at 10 Hz as "):
+        open_camera(replace(SETTINGS, pixel_format="MJPG"))
