@@ -9,15 +9,16 @@ from drivers.clock import NS_PER_S
 from vision.edges import is_image
 from vision.records import Trouble
 
-_SAMPLE_SIDE_PX = 60  # of the shorter side: enough pixels to judge, and looking at them takes no time
+_SAMPLE_SIDE_PX = 40  # of the shorter side: enough pixels to judge, and looking at them takes no time
 
 
 @dataclass(frozen=True, slots=True)
 class FrameCheckSettings:
     """When a frame is called dark, overexposed, flat or frozen; levels are grey levels, shares those of all pixels."""
 
-    dark_level: float = 16.0
-    bright_level: float = 250.0
+    dark_level: int = 16
+    max_light_share: float = 0.01  # of pixels above dark_level in a dark frame
+    bright_level: int = 250
     max_bright_share: float = 0.5
     min_deviation: float = 2.0
     frozen_after_s: float = 0.5
@@ -41,9 +42,9 @@ class FrameCheck:
         if self._last is None or not np.array_equal(sample, self._last):
             self._same_since_ns = t_capture_ns
         self._last = sample
-        if np.percentile(sample, 99) < settings.dark_level:
+        if np.count_nonzero(sample >= settings.dark_level) <= settings.max_light_share * sample.size:
             return Trouble.DARK
-        if np.mean(sample >= settings.bright_level) > settings.max_bright_share:
+        if np.count_nonzero(sample >= settings.bright_level) > settings.max_bright_share * sample.size:
             return Trouble.OVEREXPOSED
         if np.std(sample) < settings.min_deviation:
             return Trouble.FLAT
