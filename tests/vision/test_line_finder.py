@@ -209,6 +209,46 @@ def test_a_shifted_frame_has_a_shifted_answer(finder: LineFinder, shift_x: int, 
     assert after.offset_px - before.offset_px == pytest.approx(moved_px, abs=1.0)
 
 
+@settings(deadline=None, max_examples=15)
+@given(seed=st.integers(0, 999), angle_deg=st.floats(-85, 85), offset_px=st.floats(-90, 90))
+def test_a_mirrored_frame_has_a_mirrored_answer(
+    finder: LineFinder, seed: int, angle_deg: float, offset_px: float
+) -> None:
+    frame = nadir_frame(seed, math.radians(angle_deg), offset_px)
+    before, after = finder.find(frame), finder.find(np.ascontiguousarray(frame[:, ::-1]))
+    assert before.angle_rad is not None
+    assert angle_error_deg(after, -before.angle_rad) < 0.3
+    assert after.n_lines == before.n_lines
+    # Mirroring turns right to left: the right-hand normal of the mirrored line points the other way along the row.
+    assert after.offset_px == pytest.approx(-before.offset_px, abs=1.0)
+
+
+@settings(deadline=None, max_examples=15)
+@given(seed=st.integers(0, 999), angle_deg=st.floats(-85, 85), gain=st.floats(0.6, 1.5), lift=st.floats(-20, 40))
+def test_a_brighter_or_darker_frame_has_the_same_answer(
+    finder: LineFinder, seed: int, angle_deg: float, gain: float, lift: float
+) -> None:
+    frame = nadir_frame(seed, math.radians(angle_deg), 20.0)
+    changed = np.clip(np.rint(frame * gain + lift), 0, 255).astype(np.uint8)
+    before, after = finder.find(frame), finder.find(changed)
+    assert before.angle_rad is not None
+    assert angle_error_deg(after, before.angle_rad) < 0.3
+    assert after.n_lines == before.n_lines
+    assert after.offset_px == pytest.approx(before.offset_px, abs=1.0)
+
+
+@settings(deadline=None, max_examples=15)
+@given(seed=st.integers(0, 999), angle_deg=st.floats(-85, 85), sigma=st.floats(0.5, 8.0))
+def test_a_noisier_frame_has_the_same_answer(finder: LineFinder, seed: int, angle_deg: float, sigma: float) -> None:
+    frame = nadir_frame(seed, math.radians(angle_deg), 20.0)
+    noise = np.random.default_rng(seed).normal(0.0, sigma, frame.shape)
+    before, after = finder.find(frame), finder.find(np.clip(np.rint(frame + noise), 0, 255).astype(np.uint8))
+    assert before.angle_rad is not None
+    assert after.is_present
+    assert angle_error_deg(after, before.angle_rad) < 0.5
+    assert after.offset_px == pytest.approx(before.offset_px, abs=1.5)
+
+
 def test_the_same_frame_has_the_same_answer(finder: LineFinder) -> None:
     frame = nadir_frame(9, 0.7, -40.0)
     first, second = finder.find(frame), LineFinder(VisionSettings()).find(frame.copy())
