@@ -1,8 +1,15 @@
 """The page of measurements: each benchmark owns a section of docs/benchmarks.md and leaves the others as they are."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 PAGE = Path(__file__).resolve().parent.parent / "docs" / "benchmarks.md"
+
+
+def table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
+    """A Markdown table."""
+    lines = (" | ".join(cells) for cells in (columns, ["---"] * len(columns), *rows))
+    return "\n".join(f"| {line} |" for line in lines)
 
 
 def write_section(title: str, text: str, page: Path = PAGE) -> None:

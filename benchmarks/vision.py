@@ -18,7 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from benchmarks import scoring
-from benchmarks.page import PAGE, write_section
+from benchmarks.page import PAGE, table, write_section
+from benchmarks.worker import worker_text
 from vision.edges import find_edges, to_grey
 from vision.orientation import line_angle_distance_rad, segment_angles_rad
 from vision.pipeline import Detector, LineFinder, VisionSettings
@@ -59,12 +60,6 @@ def median_times_ms(tasks: Sequence[Callable[[], object]], repeats: int) -> list
             task()
             own.append(1e3 * (time.perf_counter() - begin_s))
     return [statistics.median(own) for own in times_ms]
-
-
-def table(columns: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
-    """A Markdown table."""
-    lines = (" | ".join(cells) for cells in (columns, ["---"] * len(columns), *rows))
-    return "\n".join(f"| {line} |" for line in lines)
 
 
 def edlines_alone(grey: Image) -> Callable[[], object]:
@@ -207,6 +202,7 @@ def main() -> None:
         + growth_table(finders["projection"], greys[0] if greys else radial_pattern(), options.repeats),
         "### Radial pattern ([Ceron] figure 3.15)\n\n" + radial_table(finders),
     ]
+    parts.append("### The worker\n\n" + worker_text(options.data, seconds=40.0, n_starts=5))
     if options.data:
         parts.append("### Photographs ([Ceron] 3.5 and table 6.1)\n\n" + accuracy_tables(finders, options.data))
     text = "\n\n".join(parts)
