@@ -6,6 +6,7 @@ standard deviations above any texture. What it finds is refined below the pixel,
 
 import math
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from numba import njit
@@ -14,7 +15,7 @@ from numpy.typing import NDArray
 from vision.checks import check_shares
 from vision.gradient import UNIT, unit_gradient, working_scale
 from vision.linking import segment_lengths_px
-from vision.peaks import find_peaks, line_lengths
+from vision.peaks import find_peaks, least_sums, line_lengths
 from vision.projection import project
 from vision.records import Segments
 from vision.refinement import BLOCK, keep_distinct, refine
@@ -24,6 +25,7 @@ _MAX_PEAKS = 4096
 _MAX_LINES = 32  # of each octant
 _STEP_ASIDE_PX = 1.0  # of the shrunk image
 _STEP_SPACING_PX = 3.0  # along the edge
+_STEP_PREFERENCE = 4e-4  # per grey level: a tie-break of a tenth at most
 _MERGE_ASIDE_PX = 1.5  # of the shrunk image: two findings of one edge lie this close at one end and in the middle
 
 
@@ -64,12 +66,21 @@ class ProjectionSettings:
         check_shares(self, "min_coherence", "min_length_share")
 
 
+class _Buffers(NamedTuple):
+    """What the projection of images of one shape needs, all (h, h + w) int16: see vision.projection, vision.peaks."""
+
+    first: NDArray[np.int16]
+    second: NDArray[np.int16]
+    lengths: NDArray[np.int16]
+    least: NDArray[np.int16]
+
+
 class ProjectionFinder:
     """Finds edge lines by projection; keeps buffers for the last image's shape."""
 
     def __init__(self, settings: ProjectionSettings) -> None:
         self._settings = settings
-        self._buffers: dict[tuple[int, int], tuple[NDArray[np.int16], NDArray[np.int16], NDArray[np.int16]]] = {}
+        self._buffers: dict[tuple[int, int], _Buffers] = {}
 
     def find(self, grey: NDArray[np.uint8]) -> EdgeLines:
         """Find the edge lines of `grey`, (h, w) uint8 of any size."""
@@ -82,37 +93,37 @@ class ProjectionFinder:
             # Transposed back, the right-hand side of a line becomes its left-hand side.
             found.append(flat[:, [3, 2, 1, 0, 4, 5]])
         lines = np.concatenate(found)
-        lines = lines[np.argsort(-lines[:, 4] * lines[:, 5], kind="stable")]
-        lines = lines[keep_distinct(lines, _MERGE_ASIDE_PX)]
         segments = lines[:, :4] * scale + (scale - 1) / 2
-        return EdgeLines(
-            segments, lines[:, 4], measure_steps(grey, segments, _STEP_ASIDE_PX * scale), lines[:, 5] * scale
-        )
+        steps = measure_steps(grey, segments, _STEP_ASIDE_PX * scale)
+        # Of several findings of one edge, all but equally long and even, the one with the highest step lies on it.
+        best_first = np.argsort(-lines[:, 4] * lines[:, 5] * (1.0 + _STEP_PREFERENCE * steps), kind="stable")
+        kept = best_first[keep_distinct(lines[best_first], _MERGE_ASIDE_PX)]
+        kept = kept[np.argsort(-lines[kept, 4] * lines[kept, 5], kind="stable")]
+        return EdgeLines(segments[kept], lines[kept, 4], steps[kept], lines[kept, 5] * scale)
 
     def _steep_lines(self, unit_x: NDArray[np.int8], unit_y: NDArray[np.int8]) -> NDArray[np.float64]:
         """Refined lines within 45 degrees of the columns: (n, 6) segment, coherence, covered length."""
         height, width = unit_x.shape
+        gain = min(1.0, 32000 / (UNIT * height))
         if (height, width) not in self._buffers:
             if len(self._buffers) == 2:  # one for the image, one for the transposed image
                 self._buffers.clear()
             buffer = (height, height + width)
-            self._buffers[height, width] = (
-                np.zeros(buffer, dtype=np.int16),
-                np.zeros(buffer, dtype=np.int16),
-                line_lengths(height, width),
+            min_length = math.ceil(self._settings.min_length_share * math.hypot(height, width))
+            lengths = line_lengths(height, width, min_length)
+            unit = gain * UNIT * _NORMAL_X
+            least = least_sums(lengths, self._settings.min_coherence, unit)
+            self._buffers[height, width] = _Buffers(
+                np.zeros(buffer, dtype=np.int16), np.zeros(buffer, dtype=np.int16), lengths, least
             )
-        first, second, lengths = self._buffers[height, width]
-        gain = min(1.0, 32000 / (UNIT * height))
-        min_length = self._settings.min_length_share * math.hypot(height, width)
+        buffers = self._buffers[height, width]
         field = np.empty((height, width), dtype=np.int16)
         peaks = np.empty((_MAX_PEAKS, 4))
         lines = []
         for lean in (1, -1):
             across(unit_x, unit_y, lean, gain, field)
-            sums = (first, second)[project(field, first, second)]
-            n_peaks = find_peaks(
-                sums, lengths, self._settings.min_coherence, gain * UNIT * _NORMAL_X, min_length, peaks
-            )
+            sums = (buffers.first, buffers.second)[project(field, buffers.first, buffers.second)]
+            n_peaks = find_peaks(sums, buffers.least, buffers.lengths, peaks)
             surest = np.argsort(-peaks[:n_peaks, 3], kind="stable")[:_MAX_LINES]
             for slope, middle, sign, _ in peaks[surest].tolist():
                 at = middle if lean == 1 else width - 1 - middle

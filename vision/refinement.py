@@ -11,6 +11,8 @@ from vision.gradient import UNIT
 BLOCK = 16  # rows that are judged together
 _REACH = 3  # how many columns from where it was found an edge is looked for
 _MIN_BLOCK_COHERENCE = 0.3
+_N_TURNS = 3
+_PLATEAU = 0.5  # share of the best column's coherence that its neighbours need to belong to the same edge
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
@@ -28,10 +30,12 @@ def refine(
     n_max = height // BLOCK + 1
     row, place, weight = np.empty(n_max), np.empty(n_max), np.empty(n_max)
     columns = np.empty(2 * _REACH + 1)
+    sums = np.empty((2, 2 * _REACH + 1), dtype=np.int64)
+    flat_x, flat_y = unit_x.reshape(-1), unit_y.reshape(-1)
     beside = np.empty((n_max, 3))  # coherence one column left of the line, on it, one column right
     nothing = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     first, last = 0, height - 1
-    for turn in range(3):
+    for turn in range(_N_TURNS):
         first, last = 0, height - 1
         if abs(slope) > 1e-9:
             at_left, at_right = centre + (1.0 - middle) / slope, centre + (width - 2.0 - middle) / slope
@@ -47,25 +51,22 @@ def refine(
         n_good = 0
         for block in range(n_blocks):
             begin, end = first + n_rows * block // n_blocks, first + n_rows * (block + 1) // n_blocks
-            columns[:] = 0.0
-            drift = 0.0
-            for y in range(begin, end):
-                x_line = middle + slope * (y - centre)
-                x = math.floor(x_line + 0.5)
-                drift += x - x_line
-                for k in range(-_REACH, _REACH + 1):
-                    if 0 <= x + k < width:
-                        columns[k + _REACH] += unit_x[y, x + k] - slope * unit_y[y, x + k]
-            columns *= norm / (end - begin)
+            drift = sum_columns(flat_x, flat_y, width, begin, end, middle - slope * centre, slope, sums)
+            for k in range(2 * _REACH + 1):
+                columns[k] = (sums[0, k] - slope * sums[1, k]) * norm / (end - begin)
             best = _REACH
-            reach = _REACH if turn == 0 else 2 if turn == 1 else 1
+            reach = _REACH if turn == 0 else 2 if turn < _N_TURNS - 1 else 1
             for k in range(_REACH - reach, _REACH + reach + 1):
                 if columns[k] > columns[best]:
                     best = k
             row[block] = 0.5 * (begin + end - 1) - centre
             weight[block] = max(0.0, columns[best])
             # The centre of gravity of the edge's columns: a thick edge has a plateau and no peak.
-            low, high = max(0, best - 1), min(2 * _REACH, best + 1)
+            low = high = best
+            while low > 0 and columns[low - 1] > _PLATEAU * columns[best]:
+                low -= 1
+            while high < 2 * _REACH and columns[high + 1] > _PLATEAU * columns[best]:
+                high += 1
             total, moment = 1e-9, 0.0
             for k in range(low, high + 1):
                 part = max(0.0, columns[k]) ** 2
@@ -76,7 +77,7 @@ def refine(
             n_good += weight[block] >= _MIN_BLOCK_COHERENCE
         if n_good < 2:
             return nothing
-        if turn == 2:
+        if turn == _N_TURNS - 1:
             break
         step, turn_slope = _robust_line(row[:n_blocks], place[:n_blocks], weight[:n_blocks])
         middle += step
@@ -106,6 +107,41 @@ def refine(
     if sign > 0:  # brighter towards larger x, which is on the right of one who goes up
         return end_x, end_y, begin_x, begin_y, coherence, covered_length
     return begin_x, begin_y, end_x, end_y, coherence, covered_length
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def sum_columns(
+    unit_x: NDArray[np.int8],
+    unit_y: NDArray[np.int8],
+    width: int,
+    begin: int,
+    end: int,
+    at_top: float,
+    slope: float,
+    sums: NDArray[np.int64],
+) -> float:
+    """Sum the unit gradient along the line x = at_top + slope y from row `begin` to `end`, and along its neighbours.
+
+    `unit_x` and `unit_y` are the rows of `width` one after the other, (n,). Writes `sums`, (2, 2 _REACH + 1): both
+    components, column by column from left of the line to right of it. Returns by how much the columns that were taken
+    lie right of the line, added up over the rows.
+    """
+    sums[:] = 0
+    drift = 0.0
+    for y in range(begin, end):
+        x_line = at_top + slope * y
+        x = math.floor(x_line + 0.5)
+        drift += x - x_line
+        if x >= _REACH and x < width - _REACH:
+            at = np.uint64(y * width + x - _REACH)  # unsigned: no check of every place for negative ones
+            for k in range(np.uint64(2 * _REACH + 1)):
+                sums[0, k] += unit_x[at + k]
+                sums[1, k] += unit_y[at + k]
+        else:
+            for k in range(max(0, _REACH - x), min(2 * _REACH + 1, width - x + _REACH)):
+                sums[0, k] += unit_x[y * width + x - _REACH + k]
+                sums[1, k] += unit_y[y * width + x - _REACH + k]
+    return drift
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]

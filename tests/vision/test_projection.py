@@ -13,9 +13,9 @@ from vision import edge_lines, gradient, projection
 from vision.edge_lines import ProjectionFinder, ProjectionSettings
 from vision.gradient import UNIT, unit_gradient
 from vision.orientation import line_angle_distance_rad, segment_angles_rad
-from vision.peaks import find_peaks, line_lengths
+from vision.peaks import find_peaks, least_sums, line_lengths
 from vision.projection import project
-from vision.refinement import keep_distinct, refine
+from vision.refinement import keep_distinct, refine, sum_columns
 
 
 def projected(field: np.ndarray) -> np.ndarray:
@@ -102,16 +102,24 @@ def test_compiled_and_plain_python_agree() -> None:
     np.testing.assert_array_equal(*field)
     height, width = image.shape
     sums = projected(field[0])
-    block = np.zeros((7, height + width), dtype=np.int16), np.zeros((7, height + width), dtype=np.int16)
-    projection.merge_blocks(sums[:4], sums[4:7], block[0], height, height + width)
-    projection.merge_blocks.py_func(sums[:4], sums[4:7], block[1], height, height + width)
+    end = height + width
+    block = np.zeros(7 * end, dtype=np.int16), np.zeros(7 * end, dtype=np.int16)
+    projection.merge_blocks(sums.reshape(-1), block[0], 0, 4, 7, height, end)
+    projection.merge_blocks.py_func(sums.reshape(-1), block[1], 0, 4, 7, height, end)
     np.testing.assert_array_equal(*block)
-    lengths = line_lengths(height, width)
-    np.testing.assert_array_equal(lengths, line_lengths.py_func(height, width))
+    lengths = line_lengths(height, width, 30)
+    np.testing.assert_array_equal(lengths, line_lengths.py_func(height, width, 30))
     peaks = np.zeros((99, 4)), np.zeros((99, 4))
-    n_found = find_peaks(sums, lengths, 0.3, float(UNIT), 30.0, peaks[0])
-    assert n_found == find_peaks.py_func(sums, lengths, 0.3, float(UNIT), 30.0, peaks[1])
+    least = least_sums(lengths, 0.3, float(UNIT))
+    np.testing.assert_array_equal(least, least_sums.py_func(lengths, 0.3, float(UNIT)))
+    n_found = find_peaks(sums, least, lengths, peaks[0])
+    assert n_found == find_peaks.py_func(sums, least, lengths, peaks[1])
     np.testing.assert_allclose(*peaks)
+    columns = np.zeros((2, 2, 7), dtype=np.int64)
+    for at_top, slope in ((8.0, 0.3), (-3.0, 0.9), (width - 2.0, 0.0)):
+        arguments = (unit_x.reshape(-1), unit_y.reshape(-1), width, 2, height - 3, at_top, slope)
+        assert sum_columns(*arguments, columns[0]) == pytest.approx(sum_columns.py_func(*arguments, columns[1]))
+        np.testing.assert_array_equal(columns[0], columns[1])
     lines = [refine(unit_x, unit_y, slope, middle, sign) for slope, middle, sign, _ in peaks[0][:n_found]]
     assert n_found > 0
     for line, (slope, middle, sign, _) in zip(lines, peaks[0], strict=False):
