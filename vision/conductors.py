@@ -9,12 +9,13 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from vision.edge_lines import EdgeLines
 from vision.linking import segment_lengths_px
-from vision.orientation import segment_angles_rad
 from vision.profile import measure_profile
+from vision.records import wrap_line_angle_rad
 
 _MIN_OVERLAP = 0.5  # share of the shorter edge that two edges of one conductor run side by side
 _RIM_STEP = 0.35  # share of the inner edges' step; what a camera's sharpening adds beside an edge is less
@@ -50,7 +51,8 @@ class Conductor:
     @property
     def angle_rad(self) -> float:
         """The axis' line angle [rad]."""
-        return float(segment_angles_rad(np.array([self.axis]))[0])
+        x1, y1, x2, y2 = self.axis
+        return wrap_line_angle_rad(math.atan2(x2 - x1, -(y2 - y1)))
 
     @property
     def support(self) -> float:
@@ -204,7 +206,7 @@ def _neighbours(k: int, pairs: _Pairs, is_used: NDArray[np.bool_], edges: EdgeLi
     """The edges on both sides of pair `k` that pair with its edges as well as these do with each other, or None."""
     first, second = int(pairs.first[k]), int(pairs.second[k])
     axis = _middle(_as_line(edges.segments[first]), _as_line(edges.segments[second]))
-    asides_px = _asides(edges.segments, axis)
+    asides_px = end_asides_px(edges.segments, axis).mean(axis=1)
     is_candidate = (pairs.step >= _RIM_STEP * pairs.step[k]) & (pairs.coherence >= _RIM_COHERENCE * pairs.coherence[k])
     outer = []
     for inner in (first, second):
@@ -218,20 +220,23 @@ def _neighbours(k: int, pairs: _Pairs, is_used: NDArray[np.bool_], edges: EdgeLi
     return outer[0], outer[1]
 
 
-def _asides(segments: NDArray[np.float64], axis: Line) -> NDArray[np.float64]:
-    """How far (n,) [px] the middles of (n, 4) segments lie right of the axis' infinite line."""
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def end_asides_px(segments: NDArray[np.float64], axis: Line) -> NDArray[np.float64]:
+    """How far (n, 2) [px] the first and the last point of (n, 4) segments lie right of the axis' infinite line."""
     x1, y1, x2, y2 = axis
     length = math.hypot(x2 - x1, y2 - y1)
     dx, dy = (x2 - x1) / length, (y2 - y1) / length
-    mid_x, mid_y = 0.5 * (segments[:, 0] + segments[:, 2]) - x1, 0.5 * (segments[:, 1] + segments[:, 3]) - y1
-    return mid_y * dx - mid_x * dy
+    asides_px = np.empty((segments.shape[0], 2))
+    for i in range(segments.shape[0]):
+        for end in range(2):
+            x, y = segments[i, 2 * end] - x1, segments[i, 2 * end + 1] - y1
+            asides_px[i, end] = y * dx - x * dy
+    return asides_px
 
 
 def _lies_within(segments: NDArray[np.float64], axis: Line, max_aside_px: float) -> NDArray[np.bool_]:
     """Which of (n, 4) segments have both ends within `max_aside_px` of the axis' infinite line."""
-    from_ends = _asides(segments[:, [0, 1, 0, 1]], axis)
-    to_ends = _asides(segments[:, [2, 3, 2, 3]], axis)
-    is_within: NDArray[np.bool_] = np.maximum(np.abs(from_ends), np.abs(to_ends)) <= max_aside_px
+    is_within: NDArray[np.bool_] = np.abs(end_asides_px(segments, axis)).max(axis=1, initial=0.0) <= max_aside_px
     return is_within
 
 

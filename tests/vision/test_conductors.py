@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from tests.vision.nadir_frames import ground
-from vision.conductors import Conductor, find_conductors, frame_chord_px
+from vision.conductors import Conductor, end_asides_px, find_conductors, frame_chord_px
 from vision.edge_lines import edge_lines
 
 SHAPE = (480, 640)
@@ -104,3 +104,12 @@ def test_no_edges_no_conductors() -> None:
 )
 def test_the_chord_ends_at_the_frame(axis: Edge, chord_px: float) -> None:
     assert frame_chord_px(axis, SHAPE) == pytest.approx(chord_px)
+
+
+def test_compiled_asides_equal_plain_python_and_are_right_hand_distances() -> None:
+    segments = np.random.default_rng(3).uniform(0, 400, (20, 4))
+    axis = (10.0, 300.0, 200.0, 20.0)
+    found = end_asides_px(segments, axis)
+    np.testing.assert_allclose(found, end_asides_px.py_func(segments, axis))
+    up = (100.0, 400.0, 100.0, 0.0)
+    np.testing.assert_allclose(end_asides_px(np.array([[130.0, 50.0, 80.0, 300.0]]), up), [[30.0, -20.0]])

@@ -6,6 +6,7 @@ import signal
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from select import select
 
 import pytest
 
@@ -42,7 +43,7 @@ class Watch:
         while not is_so():
             self.notices += self.eyes.take_notices()
             assert time.monotonic() < limit_s, self.notices
-            time.sleep(0.02)
+            select([self.workers[-1].fileno()], [], [], 0.02)
         self.notices += self.eyes.take_notices()
 
     def names(self) -> list[str]:
