@@ -6,7 +6,7 @@ MISSION ?= missions/follow_line.yaml
 FLY ?= --speed 1.5
 PYTEST ?=
 
-.PHONY: fly test test-v4l2 check bench bench-vision schema clean
+.PHONY: fly test test-v4l2 check bench bench-vision schema clean clean-v4l2
 
 fly: $(VENV)/.installed
 	$(BIN)/lineflight dry-run $(MISSION) $(FLY)
@@ -33,8 +33,11 @@ schema: $(VENV)/.installed
 	$(BIN)/python -c "from mission.plan_file import schema_text; print(schema_text(), end='')" > missions/mission.schema.json
 
 clean:
-	rm -rf $(VENV) .v4l2-guest .mypy_cache .pytest_cache .ruff_cache .import_linter_cache
+	rm -rf $(VENV) .mypy_cache .pytest_cache .ruff_cache .import_linter_cache
 	find . -name __pycache__ -prune -exec rm -rf {} +
+
+clean-v4l2:
+	rm -rf .v4l2-guest
 
 $(VENV)/bin/python:
 	$(PYTHON) -c "import sys; sys.exit(sys.version_info < (3, 11) and 'lineflight needs Python 3.11 or newer; try make PYTHON=python3.12')"

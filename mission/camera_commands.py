@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Literal, NoReturn
 import typer
 
 if TYPE_CHECKING:
-    from drivers.camera.camera import CameraSettings, Intrinsics
+    from drivers.camera.camera import CameraSettings
     from mission.camera_show import Viewing
+    from vision.pipeline import VisionSettings
 
 EXIT_FAILED_FILE = 1
 EXIT_BAD_INPUT = 2
@@ -74,9 +75,8 @@ def show(
     from drivers.camera.spec import open_camera, parse_spec
     from drivers.clock import ScaledClock
     from mission.camera_show import watch, write_still
-    from vision.pipeline import VisionSettings
 
-    settings, camera = _settings(mission, size, rate, pixel_format, control or [])
+    settings, vision = _settings(mission, size, rate, pixel_format, control or [])
     clock = ScaledClock()
     try:
         kind, place = parse_spec(spec)
@@ -90,7 +90,7 @@ def show(
             _keep(keep, seen)
         has_line = None
         if seen.last is not None and still is not None:
-            has_line = write_still(still, seen.last, VisionSettings(camera=camera))
+            has_line = write_still(still, seen.last, vision)
     except CameraError as error:
         _fail(str(error), EXIT_BAD_INPUT)
     _print_viewing(spec, seen, has_line, as_json=as_json)
@@ -140,12 +140,14 @@ def calibrate(
 
 def _settings(
     mission: Path | None, size: str | None, rate: float | None, pixel_format: str | None, controls: list[str]
-) -> "tuple[CameraSettings, Intrinsics | None]":
-    """What the options ask for, over what the mission file says."""
+) -> "tuple[CameraSettings, VisionSettings]":
+    """What the options ask of the camera, over what the mission file says; and how the mission looks at its frames."""
     from drivers.camera.camera import CameraSettings
+    from vision.pipeline import VisionSettings
 
-    settings, camera = CameraSettings(640, 480, 30.0), None
+    settings, vision = CameraSettings(640, 480, 30.0), VisionSettings()
     if mission is not None:
+        from mission.build import vision_settings
         from mission.live_camera import camera_settings
         from mission.plan_file import MissionFileError, read_mission
 
@@ -153,24 +155,27 @@ def _settings(
             read = read_mission(mission)
         except MissionFileError as error:
             _fail("\n".join(error.lines()), EXIT_BAD_INPUT)
-        settings, camera = camera_settings(read.plan.camera), read.camera
+        settings, vision = camera_settings(read.plan.camera), vision_settings(read.plan.vision, read.camera)
     if size is not None:
         width_px, height_px = _two_numbers(size, "--size", "640x480")
-        settings, camera = replace(settings, width_px=width_px, height_px=height_px), None
+        settings, vision = replace(settings, width_px=width_px, height_px=height_px), replace(vision, camera=None)
     if rate is not None:
         settings = replace(settings, rate_hz=rate)
     if pixel_format is not None:
+        if len(pixel_format) != 4 or not pixel_format.isascii():
+            _fail(f"--pixel-format is '{pixel_format}'; write four characters, as in YUYV or MJPG.", EXIT_BAD_INPUT)
         settings = replace(settings, pixel_format=pixel_format)
     if controls:
         settings = replace(settings, controls=tuple(_control(text) for text in controls))
-    return settings, camera
+    return settings, vision
 
 
 def _two_numbers(text: str, option: str, example: str) -> tuple[int, int]:
     first, _, second = text.lower().partition("x")
-    if not (first.isdigit() and second.isdigit() and int(first) > 1 and int(second) > 1):
-        _fail(f"{option} is '{text}'; write two numbers, as in {option} {example}.", EXIT_BAD_INPUT)
-    return int(first), int(second)
+    numbers = [int(word) if word.isascii() and word.isdecimal() else 0 for word in (first, second)]
+    if min(numbers) < 3 or max(numbers) > 20_000:
+        _fail(f"{option} is '{text}'; write two numbers from 3 on, as in {option} {example}.", EXIT_BAD_INPUT)
+    return numbers[0], numbers[1]
 
 
 def _control(text: str) -> tuple[str, int]:

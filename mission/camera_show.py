@@ -1,4 +1,4 @@
-"""What `lineflight camera` does: list cameras, watch one for a moment, calibrate one."""
+"""What `lineflight camera` does beside listing: watch a camera for a moment, calibrate one."""
 
 import time
 from collections.abc import Callable, Iterator

@@ -101,6 +101,7 @@ class Executive:
 
         def tell(missing: tuple[str, ...]) -> None:
             self._keep_status_texts()
+            self._lookout.keep_notices(self._clock.now_ns())
             self.progress = Progress(m.PREFLIGHT, None, None, None, waiting_for=missing)
 
         missing = await wait_until_ready(

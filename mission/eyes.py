@@ -11,7 +11,7 @@ from mission.guidance import GuidanceSettings, locate_line, wrap_angle_rad
 from mission.records import Event, Severity
 from mission.reporting import FlightLog
 from mission.tasks.task import Sight
-from vision.records import VisionReport
+from vision.records import BLINDING, VisionReport
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,8 +31,8 @@ class Eyes(Protocol):
         ...
 
     @property
-    def is_ready(self) -> bool:
-        """Whether the kernels are compiled and the camera gives frames."""
+    def missing(self) -> str | None:
+        """What a flight would still have to wait for; None where the eyes see."""
         ...
 
     def take(self) -> list[VisionReport]:
@@ -125,11 +125,13 @@ def sight_of(
     guidance: GuidanceSettings,
     now_ns: int,
 ) -> Sight | None:
-    """What a report means on the map. None when it is too old to steer, or when nothing is known of that time.
+    """What a report means on the map.
+
+    None when it is too old to steer, when nothing is known of that time, or when nothing can be seen in its frame.
 
     This is the one place where the age of an estimate is judged.
     """
-    if now_ns - report.t_capture_ns > guidance.max_estimate_age_s * NS_PER_S:
+    if report.trouble in BLINDING or now_ns - report.t_capture_ns > guidance.max_estimate_age_s * NS_PER_S:
         return None
     state = history.at(report.t_capture_ns)
     if state is None:
@@ -156,8 +158,7 @@ class Lookout:
     def look(self, now_ns: int, state: VehicleState) -> Sight | None:
         """The newest report since the last look, on the map; the older ones are kept in the log alone."""
         self._history.add(state)
-        for notice in self._eyes.take_notices():
-            self._log.record(Event(now_ns, notice.name, Severity.WARNING, notice.message))
+        self.keep_notices(now_ns)
         reports = self._eyes.take()
         for report in reports:
             self._log.record(report)
@@ -167,3 +168,8 @@ class Lookout:
         if sight is not None and sight.line is not None:
             self.line_seen_ns = max(self.line_seen_ns, sight.t_capture_ns)
         return sight
+
+    def keep_notices(self, now_ns: int) -> None:
+        """Put into the log what happened to the eyes."""
+        for notice in self._eyes.take_notices():
+            self._log.record(Event(now_ns, notice.name, Severity.WARNING, notice.message))

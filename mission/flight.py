@@ -3,13 +3,14 @@
 import asyncio
 import contextlib
 import functools
+import json
 import signal
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
-from drivers.camera.camera import Camera
+from drivers.camera.camera import Camera, Intrinsics
 from drivers.clock import ScaledClock
 from mission.autopilot import VehicleState
 from mission.autopilot_mavsdk import MavsdkAutopilot
@@ -71,13 +72,17 @@ async def fly(setup: FlightSetup, on_progress: Callable[[Progress], None]) -> Fl
     plan, clock = setup.mission.plan, setup.clock
     path = log_path(setup.log_folder, plan.name, datetime.now(UTC))
     with Recorder(
-        path, mission_text=setup.mission.text, mission_name=plan.name, metadata=setup.metadata, clock=clock
+        path,
+        mission_text=setup.mission.text,
+        mission_name=plan.name,
+        metadata=setup.metadata | _camera_words(setup.mission.camera),
+        clock=clock,
     ) as recorder:
         camera = setup.mission.camera
         make_worker = functools.partial(
             VisionWorker, setup.open_camera, vision_settings(plan.vision, camera), clock, plan.vision.log_rate_hz
         )
-        eyes = WorkerEyes(make_worker, clock)
+        eyes = WorkerEyes(make_worker, clock, clock.wall_s(1.0 / plan.camera.rate_hz))
         autopilot = MavsdkAutopilot(
             setup.connection, clock, lambda text: recorder.record_status_text(clock.now_ns(), f"mavsdk {text}")
         )
@@ -101,6 +106,11 @@ async def fly(setup: FlightSetup, on_progress: Callable[[Progress], None]) -> Fl
                 eyes.stop()
         on_progress(executive.progress)
     return FlightOutcome(ended, executive.may_have_armed, path, recorder.failure)
+
+
+def _camera_words(camera: Intrinsics) -> dict[str, str]:
+    """The camera as the log keeps it: what offsets and angles are worth cannot be told without it."""
+    return {"camera_intrinsics": json.dumps(asdict(camera))}
 
 
 async def _every(rate_hz: float, speed: float, act: Callable[[], None]) -> None:

@@ -48,7 +48,6 @@ async def wait_until_ready(
             else:
                 missing = ["an autopilot on the link"]
             eyes.take()
-            eyes.take_notices()
             tell(tuple(missing))
             if not missing or loop.time() > limit_s:
                 return missing
@@ -67,6 +66,6 @@ def _missing(autopilot: Autopilot, eyes: Eyes) -> list[str]:
     rest = "telemetry" if state is None else not_at_rest(state)
     if rest is not None:
         missing.append(rest)
-    if not eyes.is_ready:
-        missing.append("the first frame through vision")
+    if eyes.missing is not None:
+        missing.append(eyes.missing)
     return missing

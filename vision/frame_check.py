@@ -21,7 +21,8 @@ class FrameCheckSettings:
     bright_level: int = 250
     max_bright_share: float = 0.5
     min_deviation: float = 2.0
-    frozen_after_s: float = 0.5
+    frozen_after_s: float = 0.5  # and n_frozen frames
+    n_frozen: int = 5
 
 
 class FrameCheck:
@@ -31,6 +32,7 @@ class FrameCheck:
         self._settings = settings
         self._last: NDArray[np.uint8] | None = None
         self._same_since_ns = 0
+        self._n_same = 0
 
     def trouble(self, image: NDArray[np.uint8], t_capture_ns: int) -> Trouble | None:
         """What is wrong with `image`, (h, w) or (h, w, 3) uint8, taken at `t_capture_ns`; None for a sound one."""
@@ -40,14 +42,16 @@ class FrameCheck:
         stride = max(1, min(image.shape[:2]) // _SAMPLE_SIDE_PX)
         sample = image[::stride, ::stride].copy()
         if self._last is None or not np.array_equal(sample, self._last):
-            self._same_since_ns = t_capture_ns
+            self._same_since_ns, self._n_same = t_capture_ns, 0
         self._last = sample
+        self._n_same += 1
+        is_long = t_capture_ns - self._same_since_ns > settings.frozen_after_s * NS_PER_S
+        if is_long and self._n_same >= settings.n_frozen:
+            return Trouble.FROZEN
         if np.count_nonzero(sample >= settings.dark_level) <= settings.max_light_share * sample.size:
             return Trouble.DARK
         if np.count_nonzero(sample >= settings.bright_level) > settings.max_bright_share * sample.size:
             return Trouble.OVEREXPOSED
         if np.std(sample) < settings.min_deviation:
             return Trouble.FLAT
-        if t_capture_ns - self._same_since_ns > settings.frozen_after_s * NS_PER_S:
-            return Trouble.FROZEN
         return None

@@ -100,6 +100,10 @@ class Trouble(enum.StrEnum):
     """It has been the very same image for a while: the camera repeats itself."""
 
 
+BLINDING = frozenset({Trouble.UNREADABLE, Trouble.DARK, Trouble.FROZEN})
+"""Troubles of frames that nothing can be seen in, whatever is there."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)  # arrays have no single answer to ==
 class VisionReport:
     """What the vision worker sends for each frame it worked on.

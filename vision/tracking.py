@@ -39,19 +39,25 @@ class LineTracker:
         self._candidate: LineEstimate | None = None
         self._n_agreeing = 0
         self._has_tracked = False
+        self._last_frame_ns = 0
 
     def update(
         self, estimate: LineEstimate | None, t_capture_ns: int, diagonal_px: float
     ) -> tuple[Track, LineEstimate | None]:
         """How the frame taken at `t_capture_ns` continues the track, and its estimate where that counts, else None."""
-        settings = self._settings
-        if self._tracked is not None and elapsed_s(self._tracked, t_capture_ns) > settings.lost_after_s:
-            self._tracked = None
+        settings, tracked = self._settings, self._tracked
+        # A camera that is slower than the gap still tracks from each frame to the next.
+        was_in_last_frame = tracked is not None and tracked.t_capture_ns == self._last_frame_ns
+        self._last_frame_ns = t_capture_ns
+        if tracked is not None and not was_in_last_frame and elapsed_s(tracked, t_capture_ns) > settings.lost_after_s:
+            self._tracked = tracked = None
         if estimate is None:
             self._candidate, self._n_agreeing = None, 0
             return self._without(), None
-        is_recent = self._tracked is not None and elapsed_s(self._tracked, t_capture_ns) <= settings.max_gap_s
-        if is_recent and self._tracked is not None and self._agrees(self._tracked, estimate, diagonal_px):
+        is_recent = tracked is not None and (
+            was_in_last_frame or elapsed_s(tracked, t_capture_ns) <= settings.max_gap_s
+        )
+        if tracked is not None and is_recent and self._agrees(tracked, estimate, diagonal_px):
             return self._accept(estimate)
         is_again = self._candidate is not None and self._agrees(self._candidate, estimate, diagonal_px)
         self._candidate = estimate

@@ -4,11 +4,14 @@ import contextlib
 import math
 import os
 import signal
+import tempfile
 import threading
 import time
+import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
 from multiprocessing.connection import Connection
+from pathlib import Path
 
 import cv2
 import numpy as np
@@ -19,7 +22,7 @@ from drivers.clock import NS_PER_S, ScaledClock
 from vision.frame_check import FrameCheck, FrameCheckSettings
 from vision.outbox import Outbox
 from vision.pipeline import LineFinder, VisionSettings
-from vision.records import NO_LINES, Trouble, VisionReport
+from vision.records import BLINDING, NO_LINES, Trouble, VisionReport
 from vision.tracking import LineTracker, TrackSettings
 
 _READ_TIMEOUT_S = 0.1
@@ -92,8 +95,10 @@ def run_worker(
     except EOFError:
         outbox.put(WorkerFailed("The camera's recording has ended.", is_final=True))
     except Exception as error:
-        outbox.put(WorkerFailed(f"The vision worker met a fault of its own: {type(error).__name__}: {error}"))
-        raise
+        trace = Path(tempfile.gettempdir()) / "lineflight-vision-fault.txt"
+        trace.write_text(traceback.format_exc(), encoding="utf-8")
+        words = f"The vision worker met a fault of its own ({type(error).__name__}: {error}); send {trace} to us."
+        outbox.put(WorkerFailed(words))
     finally:
         outbox.close(_FLUSH_TIMEOUT_S)
 
@@ -159,19 +164,21 @@ class Reporter:
     def report(self, frame: Frame) -> VisionReport:
         """Find the power lines in a frame and say so; times are taken at the end of the work."""
         work_start_ns = time.perf_counter_ns()
+        if self._last_seq is not None and frame.seq <= self._last_seq:
+            # A camera that was opened again counts from 0 again, and cannot have been frozen while it was away.
+            self._last_seq, self._check = None, FrameCheck(FrameCheckSettings())
         trouble = self._check.trouble(frame.image, frame.t_capture_ns)
         estimate, power_lines = None, NO_LINES
         if trouble is not Trouble.UNREADABLE:
             detection = self._finder.find(frame.image)
             power_lines = detection.power_lines
-            if trouble is not Trouble.FROZEN:
+            if trouble not in BLINDING:
                 estimate = detection.estimate(frame.t_capture_ns)
         track, estimate = self._tracker.update(estimate, frame.t_capture_ns, math.hypot(*frame.image.shape[:2]))
         work_ns = time.perf_counter_ns() - work_start_ns
         is_kept = trouble is not Trouble.UNREADABLE and self._is_logged(frame.t_capture_ns)
         jpeg = encode_jpeg(frame.image) if is_kept else None
-        # A camera that was opened again counts from 0 again.
-        n_dropped = 0 if self._last_seq is None else max(0, frame.seq - self._last_seq - 1)
+        n_dropped = 0 if self._last_seq is None else frame.seq - self._last_seq - 1
         self._last_seq = frame.seq
         return VisionReport(
             seq=frame.seq,

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.camera.camera import CameraError, Intrinsics, Lens
+from drivers.camera.distortion import is_plausible
 
 MIN_VIEWS = 8
 """Fewer photographs do not tell focal length, distortion and the board's distance apart."""
@@ -75,7 +76,10 @@ class BoardFinder:
         board = self._board
         size = (board.columns, board.rows)
         flags = cv2.CALIB_CB_NORMALIZE_IMAGE | cv2.CALIB_CB_EXHAUSTIVE | cv2.CALIB_CB_ACCURACY
-        is_found, corners = cv2.findChessboardCornersSB(grey, size, flags=flags)
+        try:
+            is_found, corners = cv2.findChessboardCornersSB(grey, size, flags=flags)
+        except cv2.error as error:
+            raise CameraError(f"A {board} cannot be looked for in {name}: {error.err}.") from None
         if not is_found:
             return None
         columns, rows = np.meshgrid(np.arange(board.columns), np.arange(board.rows))
@@ -145,7 +149,7 @@ def _fit(views: Sequence[View], width_px: int, height_px: int, lens: Lens) -> Ca
         )
     except (cv2.error, ValueError):
         return None
-    if not _is_monotonic(camera):
+    if not is_plausible(camera):
         return None
     errors_px = []
     for i, view in enumerate(views):
@@ -158,27 +162,6 @@ def _fit(views: Sequence[View], width_px: int, height_px: int, lens: Lens) -> Ca
         tuple(float(np.sqrt(np.mean(errors**2))) for errors in errors_px),
         _coverage(views, width_px, height_px),
     )
-
-
-def _is_monotonic(camera: Intrinsics) -> bool:
-    """Whether the distorted radius grows with the true one up to the image's corners.
-
-    A polynomial that was fitted to the middle alone may turn back outside, and two places share a pixel.
-    """
-    corner = np.hypot(
-        max(camera.cx_px, camera.width_px - camera.cx_px) / camera.fx_px,
-        max(camera.cy_px, camera.height_px - camera.cy_px) / camera.fy_px,
-    )
-    if camera.lens == "fisheye":
-        k1, k2, k3, k4 = camera.distortion
-        angle = np.linspace(0.0, np.pi / 2, 500)
-        radius = angle * (1 + k1 * angle**2 + k2 * angle**4 + k3 * angle**6 + k4 * angle**8)
-    else:
-        k1, k2, _, _, k3 = camera.distortion
-        true = np.linspace(0.0, 4.0, 2000)
-        radius = true * (1 + k1 * true**2 + k2 * true**4 + k3 * true**6)
-    falls = np.flatnonzero(np.diff(radius) <= 0)
-    return len(falls) == 0 or bool(radius[falls[0]] > corner)
 
 
 def _coverage(views: Sequence[View], width_px: int, height_px: int) -> float:

@@ -114,8 +114,11 @@ class LoggedImages:
         found = self._next()
         if found is None:
             return None
-        jpeg = np.frombuffer(bytes_field(found[1], IMAGE_DATA_FIELD), dtype=np.uint8)
-        image = cv2.imdecode(jpeg, cv2.IMREAD_COLOR) if jpeg.size else None
+        try:
+            jpeg = np.frombuffer(bytes_field(found[1], IMAGE_DATA_FIELD), dtype=np.uint8)
+            image = cv2.imdecode(jpeg, cv2.IMREAD_COLOR) if jpeg.size else None
+        except (KeyError, IndexError):  # no protobuf: another program's log
+            image = None
         if image is None:
             raise CameraError(f"The log {self._path} holds a frame that cannot be decoded.")
         return np.asarray(image, dtype=np.uint8)

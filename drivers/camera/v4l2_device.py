@@ -208,13 +208,14 @@ class _Device:
         os.close(self._file)
 
     def ask(self, request: int, question: ctypes.Structure) -> bool:
-        """Let the kernel fill `question` in; False when it says that there is no such thing (EINVAL, ENOTTY)."""
+        """Let the kernel fill `question` in; False when it refuses: there is no such thing, or not now."""
         try:
             fcntl.ioctl(self._file, request, question)
         except OSError as error:
-            if error.errno in (errno.EINVAL, errno.ENOTTY, errno.ENODATA, errno.EACCES, errno.EBUSY):
-                return False
-            raise CameraError(f"The camera {self._path} does not answer: {error.strerror}.") from None
+            # Only these say that the device is gone. USB cameras answer single controls with all kinds of errors.
+            if error.errno in (errno.ENODEV, errno.ENXIO, errno.EBADF):
+                raise CameraError(f"The camera {self._path} does not answer: {error.strerror}.") from None
+            return False
         return True
 
     def info(self) -> DeviceInfo | None:
@@ -226,7 +227,8 @@ class _Device:
         if not capabilities & _CAPTURE:
             return None
         modes = tuple(self._modes())
-        return DeviceInfo(self._path, said.card.decode(), said.driver.decode(), said.bus_info.decode(), modes)
+        name, driver, bus = (word.decode(errors="replace") for word in (said.card, said.driver, said.bus_info))
+        return DeviceInfo(self._path, name, driver, bus, modes)
 
     def _modes(self) -> Iterator[Mode]:
         form = _Format(type=_CAPTURE)

@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, BinaryIO
 
 import numpy as np
+from pydantic import ValidationError
 
 from drivers.mcap_stream import IMAGE_DATA_FIELD, IMAGE_TOPIC, MAGIC, bytes_field, messages, whole_records
 from mission.autopilot import VehicleState
@@ -71,6 +72,12 @@ def _read(path: Path, file: BinaryIO, with_images: bool) -> Flight:
                 streams[channels.CHANNEL_AT[topic].record].append(channels.decode(topic, body))
             elif with_images and topic == IMAGE_TOPIC:
                 jpegs[log_time_ns] = bytes_field(body, IMAGE_DATA_FIELD)
+    except ValidationError as error:
+        first = error.errors()[0]
+        raise LogError(
+            f"The log {path} was written by another version of lineflight ({first['type']} at "
+            f"{'.'.join(map(str, first['loc']))}); read it with that one."
+        ) from error
     except Exception as error:  # the decompressor, the decoder and the parser each have their own
         raise LogError(f"The log {path} is damaged ({type(error).__name__}: {error}); recover it with mcap.") from error
     if not streams[LoggedMission]:

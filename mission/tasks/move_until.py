@@ -34,6 +34,7 @@ class MoveUntilTask:
         self._memory = memory
         self._odometer = Odometer()
         self._n_in_a_row = 0
+        self._blind_s = 0.0
         self._goal_m: float | None = None
 
     def step(self, reference: Setpoint, seen: Observation) -> Step:
@@ -41,7 +42,10 @@ class MoveUntilTask:
         heading_rad = self._memory.theta_0_rad
         moved_m = self._odometer.update(reference, heading_rad)
         self._look(reference, seen, heading_rad)
-        limit_m = self._guidance.r_m_s * seen.dt_s
+        # Without frames the line could pass below unseen: then wait for them, or for the vision_dead event.
+        self._blind_s = 0.0 if seen.sight is not None else self._blind_s + seen.dt_s
+        is_blind = self._blind_s > self._guidance.max_estimate_age_s
+        limit_m = 0.0 if is_blind else self._guidance.r_m_s * seen.dt_s
         goal_m = self._max_distance_m if self._goal_m is None else self._goal_m
         step_m = max(-limit_m, min(limit_m, goal_m - moved_m))
         setpoint = step_along(reference, heading_rad, step_m)
@@ -49,7 +53,9 @@ class MoveUntilTask:
             if moved_m >= self._max_distance_m - NEARLY_M and is_there(seen.state, setpoint, self._guidance.arrival_m):
                 return Step(setpoint, failed=f"no line within {self._max_distance_m:g} m")
             return Step(setpoint)
-        if abs(self._goal_m - moved_m) < limit_m and is_there(seen.state, setpoint, self._guidance.arrival_m):
+        if abs(self._goal_m - moved_m) < self._guidance.r_m_s * seen.dt_s and is_there(
+            seen.state, setpoint, self._guidance.arrival_m
+        ):
             self._memory.move_until_m = self._from_start_m(setpoint, heading_rad)
             where = "over the line" if self._is_overhead else "the line is in sight"
             return Step(setpoint, done=f"{where} after {moved_m:.1f} m")

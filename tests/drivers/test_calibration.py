@@ -15,6 +15,9 @@ CHECKERBOARD, CHARUCO = Board(9, 6), Board(7, 5, is_charuco=True)
 GRID = np.stack(np.meshgrid(np.linspace(60, 580, 9), np.linspace(50, 430, 7)), axis=-1).reshape(-1, 1, 2)
 
 
+LENS = "{{width_px: 640, height_px: 480, fx_px: {fx}, fy_px: 400, cx_px: 320, cy_px: 240, distortion: {distortion}}}"
+
+
 def views_of(board: Board, camera: Intrinsics, n_photos: int) -> list[View]:
     finder = BoardFinder(board)
     found = (finder.find(f"{seed}.png", photograph(board, camera, seed)) for seed in range(n_photos))
@@ -93,6 +96,12 @@ def test_the_file_gives_back_what_was_written(tmp_path: Path, camera: Intrinsics
             "is wrong at cx_px",
         ),
         ("a: 1" + " " * 70_000, "larger than 64 KB"),
+        ("[" * 5000, "nested too deeply"),
+        (LENS.format(fx=400, distortion="[12, 0, 0, 0, 0]"), "folds the image over itself"),
+        (LENS.format(fx=400, distortion="[-0.9, 0, 0, 0, 0]"), "folds the image over itself"),
+        (LENS.format(fx="1e-300", distortion="[0, 0, 0, 0, 0]"), "wrong at fx_px"),
+        (LENS.format(fx=400, distortion="[true, 0, 0, 0, 0]"), "wrong at distortion.0"),
+        (LENS.format(fx=400, distortion="null"), "wrong at distortion"),
     ],
 )
 def test_a_bad_file_is_refused_in_a_sentence(tmp_path: Path, text: str | None, words: str) -> None:

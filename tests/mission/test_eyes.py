@@ -11,7 +11,7 @@ from mission.camera_plan import pinhole_intrinsics
 from mission.eyes import GroupSize, StateHistory, sight_of
 from mission.plan import CameraPlan, GuidancePlan
 from tests.support.geometric_eyes import bare_report
-from vision.records import LineEstimate, VisionReport
+from vision.records import BLINDING, LineEstimate, Trouble, VisionReport
 
 STATE = VehicleState(
     0, 0, 0, -16, 0, 0, 0, 0, 0, 0, FlightMode.OFFBOARD, True, LandedState.IN_AIR, 0.9, is_connected=True
@@ -69,6 +69,14 @@ def test_a_frame_without_a_line_is_a_sight_without_a_line() -> None:
     seen = sight_of(report(S, None), history(replace(STATE, t_ns=S)), GroupSize(), camera, guidance, S)
     assert seen is not None
     assert seen.line is None
+
+
+@pytest.mark.parametrize("trouble", Trouble)
+def test_a_frame_that_nothing_can_be_seen_in_is_no_sight(trouble: Trouble) -> None:
+    camera, guidance = pinhole_intrinsics(CameraPlan()), guidance_settings(GuidancePlan())
+    troubled = replace(report(S, None), trouble=trouble)
+    seen = sight_of(troubled, history(replace(STATE, t_ns=S)), GroupSize(), camera, guidance, S)
+    assert (seen is None) is (trouble in BLINDING)
 
 
 def test_a_part_of_the_group_is_not_whole_once_the_group_is_known() -> None:

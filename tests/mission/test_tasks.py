@@ -139,6 +139,20 @@ def test_move_until_goes_on_until_the_line_is_below_and_remembers_the_way_from_t
     assert kept.move_until_m == pytest.approx(10.0, abs=0.15)
 
 
+def test_move_until_waits_while_nothing_is_seen() -> None:
+    """Without frames the line could pass below unseen."""
+    task = build_task(MoveUntil(task="move_until", max_distance_m=30.0), GUIDANCE, memory())
+    reference = UP
+    norths_m = []
+    for tick in range(120):
+        seen = None if 40 <= tick < 100 else sight(None)
+        reference = task.step(reference, Observation(0.05, state_at(reference), seen)).setpoint or reference
+        norths_m.append(reference.north_m)
+    blind_m = GUIDANCE.r_m_s * (GUIDANCE.max_estimate_age_s + 0.05)
+    assert norths_m[99] - norths_m[39] <= blind_m + 1e-6
+    assert norths_m[119] - norths_m[99] == pytest.approx(20 * 0.05 * GUIDANCE.r_m_s)
+
+
 def test_move_until_gives_up_at_its_limit() -> None:
     task = build_task(MoveUntil(task="move_until", max_distance_m=10.0), GUIDANCE, memory())
     step, end, _ = fly_perfectly(task, UP, None)

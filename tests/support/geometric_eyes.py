@@ -85,7 +85,7 @@ class GeometricEyes:
         self._pending: list[VisionReport] = []
         self.is_blind = False
         self.failure: str | None = None
-        self.is_ready = True
+        self.missing: str | None = None
 
     def take(self) -> list[VisionReport]:
         """Look whenever a frame is due; hand it over when its latency has passed."""

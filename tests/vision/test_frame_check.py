@@ -42,3 +42,9 @@ def test_an_image_that_never_changes_is_frozen_until_it_does() -> None:
     assert answers == [None] * 6 + [Trouble.FROZEN] * 2
     assert check.trouble(noise(2, 90, 20), NS_PER_S) is None
     assert check.trouble(still, NS_PER_S) is None
+
+
+def test_two_equal_frames_far_apart_are_not_frozen() -> None:
+    check = FrameCheck(FrameCheckSettings(frozen_after_s=0.5, n_frozen=5))
+    still = noise(1, 90, 20)
+    assert [check.trouble(still, seq * NS_PER_S) for seq in range(6)] == [None] * 4 + [Trouble.FROZEN] * 2

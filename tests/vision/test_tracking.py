@@ -17,12 +17,12 @@ def at(angle_deg: float, offset_px: float = 0.0, n_lines: int = 3, spacing_px: f
     return LineEstimate(wrap_line_angle_rad(math.radians(angle_deg)), offset_px, n_lines, spacing_px, 0.9, 0)
 
 
-def track(estimates: list[LineEstimate | None], tracker: LineTracker | None = None) -> list[tuple[Track, bool]]:
+def track(estimates: list[LineEstimate | None], period_ns: int = PERIOD_NS) -> list[tuple[Track, bool]]:
     """The track after each frame, and whether its estimate counted."""
-    tracker = tracker or LineTracker(TrackSettings())
+    tracker = LineTracker(TrackSettings())
     answers = []
     for seq, estimate in enumerate(estimates):
-        t_ns = seq * PERIOD_NS
+        t_ns = seq * period_ns
         if estimate is not None:
             estimate = LineEstimate(
                 estimate.angle_rad, estimate.offset_px, estimate.n_lines, estimate.spacing_px, 0.9, t_ns
@@ -84,6 +84,17 @@ def test_a_brisk_turn_is_followed_across_the_wrap(rate_deg_s: float) -> None:
         estimates.append(at(angle_deg, -120.0 if is_wrapped else 120.0))
     assert len({estimate.offset_px for estimate in estimates}) == 2
     assert track(list(estimates))[1:] == [TRACKING] * 59
+
+
+@pytest.mark.parametrize("rate_hz", [0.5, 1.0, 2.0, 3.2, 4.0])
+def test_a_slow_camera_tracks_from_frame_to_frame(rate_hz: float) -> None:
+    answers = track([at(angle_deg) for angle_deg in range(10)], round(1e9 / rate_hz))
+    assert answers == [SEARCHING, *[TRACKING] * 9]
+
+
+def test_after_a_gap_the_line_is_confirmed_anew() -> None:
+    assert track([at(0), at(0), *[None] * 12, at(2), at(2)])[-2:] == [DOUBTFUL, TRACKING]
+    assert track([at(0), at(0), *[None] * 5, at(2)])[-1] == TRACKING
 
 
 def test_the_middle_may_move_when_conductors_come_into_view() -> None:

@@ -82,6 +82,26 @@ def test_a_frozen_camera_stops_steering_although_its_image_shows_a_line(finder: 
 
 
 @pytest.mark.parametrize(
+    ("level", "trouble"), [(250, Trouble.OVEREXPOSED), (170, Trouble.FLAT)], ids=["overexposed", "flat"]
+)
+def test_a_frozen_frame_of_any_kind_stops_steering(finder: LineFinder, level: int, trouble: Trouble) -> None:
+    """A white sky or an even field behind the line is a normal view; the very same one for half a second is not."""
+
+    def view(seed: int) -> NDArray[np.uint8]:
+        image = np.random.default_rng(seed).normal(level, 1.0, SIZE)
+        image[:, 301:303] -= 60.0 if trouble is Trouble.OVEREXPOSED else 14.0
+        return np.clip(np.rint(image), 0, 255).astype(np.uint8)
+
+    eye = Eye(finder)
+    lively = [eye.show(view(seed)) for seed in range(20)]
+    assert {report.trouble for report in lively} == {trouble}
+    assert all(report.estimate is not None for report in lively[1:])
+    still = [eye.show(view(99)) for _ in range(25)]
+    assert still[-1].trouble is Trouble.FROZEN
+    assert still[-1].estimate is None
+
+
+@pytest.mark.parametrize(
     "image",
     [
         np.repeat(line_frame(3)[:, :, None], 3, axis=2),
