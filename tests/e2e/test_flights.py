@@ -98,7 +98,7 @@ tasks:
   - {task: ascend, altitude_m: 16}
   - {task: move_until}
   - {task: align, turn: right}
-  - {task: follow_lines, distance_m: 15}
+  - {task: follow_lines, distance_m: 12}
   - {task: return}
 camera: {calibration: lens.yaml}
 """

@@ -81,5 +81,7 @@ def test_what_is_clipped_is_in_view(start: list[float], end: list[float]) -> Non
 
 
 def test_projecting_compiled_equals_plain_python() -> None:
-    lens = np.array([400.0, 410.0, 320.0, 240.0, -0.2, 0.05, 0.001, -0.002, 0.01])
-    assert project_point(1.0, -2.0, 5.0, lens) == pytest.approx(project_point.py_func(1.0, -2.0, 5.0, lens))
+    for is_fisheye in (0.0, 1.0):
+        lens = np.array([400.0, 410.0, 320.0, 240.0, -0.2, 0.05, 0.001, -0.002, 0.01, is_fisheye])
+        for point in ((1.0, -2.0, 5.0), (0.0, 0.0, 5.0)):
+            assert project_point(*point, lens) == pytest.approx(project_point.py_func(*point, lens))
