@@ -59,7 +59,7 @@ def show(
     spec: Annotated[str, typer.Argument(help="v4l2:DEVICE or file:PATH (video, images, flight log).")],
     mission: Annotated[Path | None, typer.Option(help="Take the camera section of this mission file.")] = None,
     size: Annotated[
-        str | None, typer.Option(help="WIDTHxHEIGHT [px]; else the mission's, the recording's, or 640x480.")
+        str | None, typer.Option(help="WIDTHxHEIGHT in pixels; else the mission's, the recording's, or 640x480.")
     ] = None,
     rate: Annotated[float | None, typer.Option(min=0.1, max=240, help="Frames a second; else 30.")] = None,
     pixel_format: Annotated[str | None, typer.Option(help="YUYV, MJPG, ...; V4L2 alone.")] = None,

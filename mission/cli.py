@@ -45,7 +45,7 @@ app.add_typer(camera_app, name="camera")
 MissionArgument = Annotated[Path, typer.Argument(help="The mission file (YAML); missions/ holds examples.")]
 SpeedOption = Annotated[float, typer.Option(min=0.1, max=20, help="Times faster than real time.")]
 SeedOption = Annotated[int, typer.Option(min=0, help="Seed of wind, sensors and image noise.")]
-WindOption = Annotated[float, typer.Option(min=0, max=20, help="Mean wind [m/s], with the gusts that belong to it.")]
+WindOption = Annotated[float, typer.Option(min=0, max=20, help="Mean wind in m/s, with the gusts that belong to it.")]
 WorldOption = Annotated[str | None, typer.Option(help="A world's name or file; by default medium_voltage.")]
 LogOption = Annotated[Path, typer.Option(help="The folder for logs.")]
 # vision.pipeline.Detector, without its import

@@ -93,7 +93,9 @@ class LineFinder:
         camera = self._settings.camera
         size = (96, 96) if camera is None else (camera.height_px, camera.width_px)
         colour = np.full((*size, 3), 60, dtype=np.uint8)
-        colour[:, 40:43] = 220
+        # In the middle, where no lens bends it: a line that is not found compiles nothing of what comes after.
+        middle = size[1] // 2
+        colour[:, middle : middle + 3] = 220
         grey = np.ascontiguousarray(colour[:, :, 0])
         # To the compiler an array that must not be written to is another type, and cameras give those.
         locked = grey.copy()

@@ -100,6 +100,11 @@ def calibrate(views: Sequence[View], width_px: int, height_px: int, lens: Lens |
 
     Raises CameraError for fewer than MIN_VIEWS views, and where no model fits.
     """
+    if not views:
+        raise CameraError(
+            "The board was found in no photograph: count its inner corners (checkerboard) or squares (ChArUco) for "
+            "--board, and say --charuco where it is one."
+        )
     if len(views) < MIN_VIEWS:
         raise CameraError(
             f"The board was found in {len(views)} photographs, but a calibration needs {MIN_VIEWS} or more: take some "

@@ -47,7 +47,9 @@ def read_calibration(path: Path) -> Intrinsics:
         focal_px, centre_px = (said.fx_px, said.fy_px), (said.cx_px, said.cy_px)
         camera = Intrinsics(said.width_px, said.height_px, *focal_px, *centre_px, tuple(said.distortion), said.lens)
         if not is_plausible(camera):
-            raise ValueError("no lens distorts like this: it folds the image over itself, or moves its corners too far")
+            raise ValueError(
+                "no lens is like this: it folds the image, moves its corners too far, or its view is too wide or narrow"
+            )
         return camera
     except ValidationError as error:
         first = error.errors()[0]

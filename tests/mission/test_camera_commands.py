@@ -111,7 +111,7 @@ def test_a_camera_that_cannot_be_is_refused_with_its_line(tmp_path: Path, camera
         (("calibrate", "missions", "--board", "2x4"), "--board is '2x4'"),
         (("calibrate", "none"), "no folder none"),
         (("calibrate", "missions"), "holds no photographs"),
-        (("calibrate", "docs/images"), "found in 0 photographs"),
+        (("calibrate", "docs/images"), "found in no photograph"),
         (("calibrate", "missions", "--board", "9by6"), "--board is '9by6'"),
     ],
 )

@@ -1,5 +1,6 @@
 """The line finder: angle, offset, number and presence on drawn nadir frames; honest on whatever else it is shown."""
 
+import itertools
 import math
 import subprocess
 import sys
@@ -276,10 +277,14 @@ def test_every_detector_finds_a_plain_line_and_answers_anything(detector: Detect
         assert is_honest(finder.find(np.random.default_rng(1).integers(0, 256, size, dtype=np.uint8)))
 
 
-@pytest.mark.parametrize("detector", ["projection", "cbs", "steerable"])
-def test_no_frame_waits_for_the_compiler(detector: Detector) -> None:
+@pytest.mark.parametrize(
+    ("detector", "lens"),
+    [*itertools.product(["projection", "cbs", "steerable"], ["none"]),
+     *itertools.product(["projection"], ["mild", "wide", "fisheye"])],
+)  # fmt: skip
+def test_no_frame_waits_for_the_compiler(detector: Detector, lens: str) -> None:
     # In a process of its own: in this one other tests have compiled the kernels for every kind of image.
-    command = [sys.executable, "-m", "tests.vision.count_compilations", detector]
+    command = [sys.executable, "-m", "tests.vision.count_compilations", detector, lens]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     n_warm, n_late = (int(word) for word in done.stdout.split())
     assert n_warm > 5
