@@ -74,7 +74,7 @@ def show(
     from drivers.camera.recorded import recording_size_px
     from drivers.camera.spec import open_camera, parse_spec
     from drivers.clock import ScaledClock
-    from mission.camera_show import watch, write_still
+    from mission.camera_show import watch, write_image, write_still
 
     settings, vision = _settings(mission, size, rate, pixel_format, control or [])
     clock = ScaledClock()
@@ -87,7 +87,7 @@ def show(
             _print_controls(place)
         seen = watch(open_camera(spec, settings, clock), clock, seconds)
         if seen.last is not None and keep is not None:
-            _keep(keep, seen)
+            write_image(keep, seen.last.image)
         has_line = None
         if seen.last is not None and still is not None:
             has_line = write_still(still, seen.last, vision)
@@ -194,20 +194,6 @@ def _print_controls(device: Path) -> None:
         fixed = ", read only" if control.is_read_only else ""
         typer.echo(f"    {control.name} = {value}  ({control.kind}, {control.minimum} to {control.maximum}, "
                    f"default {control.default}{fixed})")  # fmt: skip
-
-
-def _keep(file: Path, seen: "Viewing") -> None:
-    import cv2
-
-    from drivers.camera.camera import CameraError
-
-    assert seen.last is not None  # noqa: S101  the caller looked
-    try:
-        file.parent.mkdir(parents=True, exist_ok=True)
-        if not cv2.imwrite(str(file), seen.last.image):
-            raise CameraError(f"The frame cannot be written to {file}; name a .png or .jpg file.")
-    except (OSError, cv2.error) as error:
-        raise CameraError(f"The frame cannot be written to {file}: {error}; name a .png or .jpg file.") from None
 
 
 def _print_viewing(spec: str, seen: "Viewing", has_line: bool | None, *, as_json: bool) -> None:

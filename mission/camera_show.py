@@ -80,14 +80,19 @@ def write_still(file: Path, frame: Frame, settings: VisionSettings) -> bool:
     """Draw what the line finder sees in a frame to an image file; whether it sees a power line. Raises CameraError."""
     image = frame.image if frame.image.ndim == 3 else np.repeat(frame.image[:, :, None], 3, axis=2)
     detection = LineFinder(settings).find(image)
+    write_image(file, draw(image, detection))
+    return detection.is_present
+
+
+def write_image(file: Path, image: NDArray[np.uint8]) -> None:
+    """Write an image, (h, w) or (h, w, 3) BGR, to a file of any kind that OpenCV knows. Raises CameraError."""
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
-        is_written, encoded = cv2.imencode(file.suffix or ".png", draw(image, detection))
+        is_written, encoded = cv2.imencode(file.suffix or ".png", image)
         if is_written:
             file.write_bytes(encoded.tobytes())
     except (OSError, cv2.error) as error:
-        raise CameraError(f"The still {file} cannot be written: {error}; name a .png or .jpg file.") from None
-    return detection.is_present
+        raise CameraError(f"The image {file} cannot be written: {error}; name a .png or .jpg file.") from None
 
 
 def board_photos(folder: Path) -> list[Path]:
