@@ -4,7 +4,7 @@ import asyncio
 from collections.abc import Callable
 
 from drivers.clock import Clock
-from mission.autopilot import Autopilot, AutopilotError, LandedState, VehicleState
+from mission.autopilot import Autopilot, AutopilotError, FlightMode, LandedState, VehicleState
 from mission.eyes import Eyes
 
 _POLL_S = 0.2
@@ -22,6 +22,11 @@ def not_at_rest(state: VehicleState) -> str | None:
     return None
 
 
+def is_handed_over(state: VehicleState) -> bool:
+    """Whether a pilot has left a flying vehicle hovering in hold mode, from where a mission may be resumed."""
+    return state.is_armed and state.landed is LandedState.IN_AIR and state.mode is FlightMode.HOLD
+
+
 async def wait_until_ready(
     autopilot: Autopilot,
     eyes: Eyes,
@@ -29,6 +34,8 @@ async def wait_until_ready(
     time_limit_s: float,
     is_stopped: Callable[[], bool],
     tell: Callable[[tuple[str, ...]], None],
+    *,
+    may_fly: bool = False,
 ) -> list[str]:
     """Connect and wait; returns what is still missing after `time_limit_s` [s, wall], empty when all is ready.
 
@@ -44,7 +51,7 @@ async def wait_until_ready(
                 return [eyes.failure]
             if connecting.done():
                 connecting.result()
-                missing = _missing(autopilot, eyes)
+                missing = _missing(autopilot, eyes, may_fly=may_fly)
             else:
                 missing = ["an autopilot on the link"]
             eyes.take()
@@ -60,10 +67,14 @@ async def wait_until_ready(
     return ["the operator asked to stop"]
 
 
-def _missing(autopilot: Autopilot, eyes: Eyes) -> list[str]:
+def _missing(autopilot: Autopilot, eyes: Eyes, *, may_fly: bool) -> list[str]:
     missing = autopilot.missing_health()
     state = autopilot.state
     rest = "telemetry" if state is None else not_at_rest(state)
+    if may_fly and state is not None and not is_handed_over(state):
+        rest = rest and f"{rest}, or to hover in hold mode"
+    elif may_fly and rest is not None and state is not None:
+        rest = None
     if rest is not None:
         missing.append(rest)
     if eyes.missing is not None:

@@ -21,6 +21,7 @@ class GoDownTask:
 
     needs_line = False
     needs_vision = False
+    progress = 0.0
 
     def __init__(self, command: Command, pause_s: float = 0.0) -> None:
         self.command = command

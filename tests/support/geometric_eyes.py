@@ -86,6 +86,7 @@ class GeometricEyes:
         self.is_blind = False
         self.failure: str | None = None
         self.missing: str | None = None
+        self.impairment: Notice | None = None
 
     def take(self) -> list[VisionReport]:
         """Look whenever a frame is due; hand it over when its latency has passed."""

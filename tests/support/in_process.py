@@ -7,7 +7,15 @@ import math
 from collections.abc import Callable
 
 from drivers.clock import Clock
-from mission.autopilot import AutopilotError, FlightMode, LandedState, NoAnswerError, Setpoint, VehicleState
+from mission.autopilot import (
+    AutopilotError,
+    FlightMode,
+    GlobalPoint,
+    LandedState,
+    NoAnswerError,
+    Setpoint,
+    VehicleState,
+)
 from sitl.autopilot import SimAutopilot
 from sitl.modes import Answer, Landed, Mode
 from sitl.vehicle import Vehicle, euler_of
@@ -37,6 +45,9 @@ class InProcessAutopilot:
         self.sim = SimAutopilot(Vehicle(yaw_rad=start_yaw_rad), Wind(wind_m_s, seed), seed=seed)
         self._heartbeat: tuple[Mode, bool] = (self.sim.mode, False)
         self._heartbeat_s = 0.0
+        self._heartbeat_failsafe = False
+        self._target: Setpoint | None = None
+        self._target_s = 0.0
         self.is_connected = True
         self.commands: list[str] = []
         self.n_setpoints = 0
@@ -54,6 +65,16 @@ class InProcessAutopilot:
             if self.sim.boot_s - self._heartbeat_s >= 1.0:
                 self._heartbeat_s += 1.0
                 self._heartbeat = (self.sim.mode, self.sim.is_armed)
+                self._heartbeat_failsafe = self.sim.failsafe is not None
+            if self.sim.boot_s - self._target_s >= 0.1:
+                self._target_s = self.sim.boot_s
+                self._tell_target()
+
+    def _tell_target(self) -> None:
+        """POSITION_TARGET_LOCAL_NED, ten times a second."""
+        setpoint = self.sim.setpoint
+        if setpoint is not None and None not in setpoint.position_m:
+            self._target = Setpoint(*setpoint.position_m, setpoint.yaw_rad)
 
     def _repeat_setpoint(self) -> None:
         """MAVSDK's own thread repeats the last setpoint, until a heartbeat says that the mode is another."""
@@ -81,7 +102,17 @@ class InProcessAutopilot:
             _LANDED[self.sim.landed],
             self.sim.battery.remaining,
             self.is_connected,
+            is_failsafe=self._heartbeat_failsafe,
         )
+
+    @property
+    def target(self) -> Setpoint | None:
+        self.catch_up()
+        return self._target
+
+    async def read_origin(self) -> GlobalPoint | None:
+        origin = self.sim.origin
+        return GlobalPoint(*origin.global_of((0.0, 0.0, 0.0)))
 
     def drain_status_texts(self) -> list[str]:
         return [text for _, text in self.sim.drain_texts()]
