@@ -165,6 +165,11 @@ class MavlinkFace:
             yaw_rad = math.nan if message.type_mask & _IGNORE_YAW else message.yaw
             self._autopilot.set_position_setpoint(message.x, message.y, message.z, yaw_rad)
 
+    def _on_manual_control(self, message: Any) -> None:
+        if message.target in (0, _SYSTEM):
+            x, y, z, r = (value / 1000 for value in (message.x, message.y, message.z, message.r))
+            self._autopilot.set_sticks(x, y, z, r)
+
     def _on_param_request_read(self, message: Any) -> None:
         try:
             if message.param_index >= 0:
