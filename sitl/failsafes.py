@@ -14,7 +14,8 @@ from sitl.parameters import Parameters
 Say = Callable[[Severity, str], None]
 
 _TEXT_GAP_S = 2.0  # PX4's health report is told at most this often
-_ACTIONS = {2: Mode.LOITER, 3: Mode.RTL, 5: Mode.LAND}  # GF_ACTION, NAV_RCL_ACT; the others are not modelled
+_FENCE_ACTIONS = {2: Mode.LOITER, 3: Mode.RTL, 5: Mode.LAND}  # GF_ACTION; 4, terminate, is not modelled
+_STICKS_ACTIONS = {1: Mode.LOITER, 2: Mode.RTL}  # NAV_RCL_ACT; all else lands
 _OFFBOARD_ACTIONS = {3: Mode.RTL, 4: Mode.LAND, 5: Mode.LOITER}  # COM_OBL_RC_ACT; the others need sticks
 
 
@@ -147,7 +148,7 @@ class Failsafes:
         if self._battery_mode is not None:
             self._battery_mode = Mode.LAND if self.warning is BatteryWarning.EMERGENCY else Mode.RTL
         if self._sticks_mode is not None:
-            self._sticks_mode = _ACTIONS.get(int(self._parameters.get("NAV_RCL_ACT")), Mode.RTL)
+            self._sticks_mode = _STICKS_ACTIONS.get(int(self._parameters.get("NAV_RCL_ACT")), Mode.LAND)
 
     def _watch_fence(self, seen: Observation) -> None:
         """The cylinder around home (GF_MAX_HOR_DIST, GF_MAX_VER_DIST), by GF_ACTION."""
@@ -165,7 +166,7 @@ class Failsafes:
                 if not self._has_left_fence:
                     self._say(Severity.CRITICAL, f"{words} reached ({limit_m:.5f})")
         if outside and not self._has_left_fence:
-            self._fence_mode = _ACTIONS.get(action)
+            self._fence_mode = _FENCE_ACTIONS.get(action)
             if self._fence_mode is None:
                 self._announce()  # GF_ACTION 1 only warns
         self._has_left_fence = outside
