@@ -8,18 +8,24 @@ from collections import deque
 from dataclasses import replace
 
 from sitl.battery import Battery
-from sitl.commander import Commander, Failsafe, Observation
+from sitl.commander import Commander
 from sitl.control import AttitudeControl, Estimate, PositionControl, Setpoint, attitude_of
 from sitl.estimator import Estimator
+from sitl.failsafes import Failsafe, Observation
 from sitl.flight_tasks import Descend, FlightTask, Hold, Land, Offboard, Return, Takeoff
+from sitl.manual_tasks import AltitudeTask, StickTask
 from sitl.modes import Answer, Landed, Mode, Severity
 from sitl.parameters import Parameters
+from sitl.pilot import Pilot, Sticks
 from sitl.place import Home, Origin
+from sitl.positioning import Positioning
 from sitl.takeoff_landing import LandDetector, Ramp, TakeoffRamp
 from sitl.vehicle import Vector, Vehicle, euler_of
 from sitl.wind import Wind
 
 _HOME_S = 1.2  # after boot: the first home
+_MIN_SATELLITES = 4  # for a fix
+DEFAULT_UID = 5283920058631409231  # that of every PX4 SITL
 _NAVIGATOR_S = 0.04  # from a mode change to what PX4's navigator says about it
 
 
@@ -39,8 +45,13 @@ class SimAutopilot:
         origin: Origin | None = None,
         speed: float = 1.0,
         is_noisy: bool = True,
+        uid: int = DEFAULT_UID,
     ) -> None:
-        """Boot. `speed` is how many times faster than the wall clock it will be stepped (see Commander)."""
+        """Boot. `speed` is how many times faster than the wall clock it will be stepped (see Commander).
+
+        `uid` is the hardware's number, 64 bits (AUTOPILOT_VERSION): another one is another vehicle.
+        """
+        self.uid = uid
         self.vehicle = vehicle or Vehicle()
         self.wind = wind or Wind(0.0, seed)
         self.parameters = parameters or Parameters()
@@ -69,6 +80,9 @@ class SimAutopilot:
         self._has_taken_off = False
         self._takeoff_requests = 0
         self._takeoff_altitude_m: float | None = None
+        self._pilot = Pilot(self.parameters)
+        self._positioning = Positioning()
+        self.last_fix_m: Vector = self.estimate.position_m
 
     # --- what a ground station or an application asks ---
 
@@ -97,6 +111,26 @@ class SimAutopilot:
         if self._task is not None and self._task.is_landing:
             return Landed.LANDING
         return Landed.IN_AIR
+
+    @property
+    def has_gps(self) -> bool:
+        """Whether the receiver has a fix (SIM_GPS_USED satellites, GPS_RAW_INT)."""
+        return self.parameters.get("SIM_GPS_USED") >= _MIN_SATELLITES
+
+    @property
+    def is_position_ok(self) -> bool:
+        """Whether SYS_STATUS tells that the global position is good (the GPS sensor is present)."""
+        return self._positioning.is_reported
+
+    @property
+    def is_position_valid(self) -> bool:
+        """Whether the autopilot itself would still fly by its horizontal position."""
+        return self._positioning.is_valid
+
+    @property
+    def sticks(self) -> Sticks | None:
+        """Where a pilot's sticks stand; None while none come."""
+        return self._pilot.sticks
 
     @property
     def has_seen_setpoints(self) -> bool:
@@ -156,6 +190,13 @@ class SimAutopilot:
         if isinstance(self._task, Offboard):
             self._task.aim(*self._offboard_target)
 
+    def set_sticks(self, pitch: float, roll: float, throttle: float, yaw: float) -> None:
+        """Take a pilot's sticks (MANUAL_CONTROL): pitch forward, roll and yaw right -1 to 1, throttle 0 to 1.
+
+        Centred is 0, but 0.5 for the throttle. They have to come again within COM_RC_LOSS_T, or count as gone.
+        """
+        self._pilot.take(Sticks(pitch, roll, throttle, yaw), self.boot_s)
+
     def set_parameter(self, name: str, value: float | int) -> None:
         """Write a parameter; raises KeyError, TypeError and ValueError as Parameters.set does."""
         self.parameters.set(name, value)
@@ -176,7 +217,12 @@ class SimAutopilot:
         """Let `dt_s` [s] of flight time pass; at most 10 ms for the controllers' sake."""
         self.boot_s += dt_s
         vehicle, commander = self.vehicle, self.commander
+        self._pilot.step(self.boot_s)
+        self._positioning.step(self.boot_s, has_gps=self.has_gps)
+        mode = commander.mode
         commander.step(self._observation())
+        if commander.mode is not mode:
+            self._pilot.rest()
         if self._was_armed and not commander.is_armed:
             self._set_home()
         self._was_armed = commander.is_armed
@@ -193,7 +239,13 @@ class SimAutopilot:
         self._air_m_s = self.wind.step(dt_s, vehicle.height_m, airspeed_m_s)
         vehicle.step(dt_s, thrust, torque, self._air_m_s)
         self.battery.step(dt_s, vehicle.power_w)
-        self.estimate = self._estimator.step(dt_s, vehicle)
+        drain_s = self.parameters.get("SIM_BAT_DRAIN")
+        if drain_s > 0 and commander.is_armed:
+            least = self.parameters.get("SIM_BAT_MIN_PCT") / 100
+            self.battery.drain(dt_s, empty_after_s=drain_s, least=least)
+        self.estimate = self._estimator.step(dt_s, vehicle, has_gps=self._positioning.has_gps)
+        if self._positioning.has_gps:
+            self.last_fix_m = self.estimate.position_m
         self._detect_landing(dt_s)
         if self.home is None and self.boot_s >= _HOME_S:
             self._set_home()
@@ -227,7 +279,11 @@ class SimAutopilot:
         if not self.is_armed:
             self._task = self._task_key = None
             return
-        key = (self.mode, self._takeoff_requests if self.mode is Mode.TAKEOFF else 0)
+        takeoff = self._takeoff_requests if self.mode is Mode.TAKEOFF else 0
+        # What else decides between the tasks of a mode.
+        is_steered = self.mode.needs_sticks and self.sticks is not None
+        is_blind = not self.is_position_valid and (self.mode.needs_sticks or self.mode is Mode.LAND)
+        key = (self.mode, takeoff, is_steered, is_blind)
         if key != self._task_key:
             self._task_key = key
             self._task = self._task_of(self.mode)
@@ -247,10 +303,14 @@ class SimAutopilot:
                 delay_s=_NAVIGATOR_S,
             )
             return task
-        if mode is Mode.LAND:
+        if mode is Mode.LAND and self.is_position_valid:
             return Land(self.parameters, self.estimate)
-        if self.commander.is_descending_without_sticks:
-            return Descend(self.parameters, self.estimate)
+        if mode is Mode.LAND or (mode.needs_sticks and self.sticks is None):
+            return Descend(self.parameters, self.estimate, is_blind=not self.is_position_valid)
+        if mode is Mode.POSCTL:
+            return StickTask(self.parameters, self.estimate, self._pilot)
+        if mode.needs_sticks:  # the model has no attitude or rate mode: it holds the altitude in all of them
+            return AltitudeTask(self.parameters, self.estimate, self._pilot)
         return Hold(self.parameters, self.estimate)
 
     def _takeoff_down_m(self) -> float:
@@ -290,6 +350,10 @@ class SimAutopilot:
             self.say(Severity.INFO, "Landing detected")
 
     def _observation(self) -> Observation:
+        distance_m = height_m = 0.0
+        if self.home is not None:
+            (n, e, d), (home_n, home_e, home_d) = self.estimate.position_m, self.home.position_m
+            distance_m, height_m = math.hypot(n - home_n, e - home_e), home_d - d
         return Observation(
             boot_s=self.boot_s,
             setpoint_age_s=None if self._setpoint_s is None else self.boot_s - self._setpoint_s,
@@ -297,6 +361,11 @@ class SimAutopilot:
             landed_s=self._land_detector.landed_s,
             has_taken_off=self._has_taken_off,
             battery=self.battery.remaining,
+            is_position_valid=self.is_position_valid,
+            has_sticks=self.sticks is not None,
+            is_stick_moving=self._pilot.is_moving,
+            distance_m=distance_m,
+            height_m=height_m,
         )
 
     def _set_home(self) -> None:

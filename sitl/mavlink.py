@@ -1,11 +1,9 @@
-"""The simulated autopilot's MAVLink face over UDP: streams out, commands, parameters and setpoints in.
+"""The simulated autopilot's MAVLink face: streams out, commands, parameters and setpoints in, as PX4's offboard link.
 
-It speaks as PX4's offboard link in SITL does: it sends to the application's port from a port of its own, and answers
-every station that writes to that port. `service` never blocks and knows no time but the autopilot's.
+It turns bytes into bytes and knows no time but the autopilot's; sitl.udp carries them.
 """
 
 import math
-import socket
 import struct
 from collections import deque
 from typing import Any
@@ -19,8 +17,6 @@ from sitl.modes import Answer, Severity
 from sitl.parameters import Parameter
 from sitl.telemetry import STREAMS, Stream
 
-_OWN_PORT_OFFSET = 40  # PX4: 14580 speaks to 14540
-_LAST_PORT = 65535
 _FIRST_BEAT_S = 0.24  # after boot; the heartbeat keeps this fraction of each second
 _COMMAND_S = 0.008  # a command waits this long for PX4's commander, in flight time
 _TEXT_CHUNK = 50
@@ -36,8 +32,6 @@ _MAX_INTERVAL_US = 2**31 - 1  # what MESSAGE_INTERVAL can tell
 
 _COMPONENT_METADATA, _COMPONENT_METADATA_EXTRA = 397, 182
 
-Address = tuple[str, int]
-
 
 class _NoComponentMetadata(dialect.MAVLink_message):  # type: ignore[misc]
     """COMPONENT_METADATA, which the dialect lacks, saying that there is no file (and so no checksum of it)."""
@@ -51,28 +45,12 @@ class _NoComponentMetadata(dialect.MAVLink_message):  # type: ignore[misc]
 
 
 class MavlinkFace:
-    """One autopilot's UDP link. Use it as a context manager, or `close` it."""
+    """One autopilot's end of a MAVLink link: bytes in by `receive`, bytes out by `service`."""
 
-    def __init__(self, autopilot: SimAutopilot, port: int, host: str = "127.0.0.1") -> None:
-        """Speak to `host`:`port` from port + 40; raises OSError with a sentence when it cannot have that port."""
+    def __init__(self, autopilot: SimAutopilot) -> None:
+        """Speak for `autopilot`."""
         self._autopilot = autopilot
-        if port + _OWN_PORT_OFFSET > _LAST_PORT:
-            raise OSError(
-                f"UDP port {port} leaves none for the simulated autopilot, which speaks from {_OWN_PORT_OFFSET} above; "
-                f"choose a port up to {_LAST_PORT - _OWN_PORT_OFFSET}"
-            )
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._socket.setblocking(False)
-        try:
-            self._socket.bind(("127.0.0.1", port + _OWN_PORT_OFFSET))
-        except OSError as error:
-            self._socket.close()
-            raise OSError(
-                f"UDP port {port + _OWN_PORT_OFFSET} for the simulated autopilot cannot be had ({error.strerror}); "
-                "end the other simulation or choose another port"
-            ) from error
-        # The application is spoken to unasked, other stations once they were heard.
-        self._stations: list[Address] = [(host, port)]
+        self._outbox: list[bytes] = []
         self._mavlink: Any = dialect.MAVLink(None, srcSystem=_SYSTEM, srcComponent=_COMPONENT)
         self._streams = {stream.message_id: stream for stream in STREAMS}
         first_s = autopilot.boot_s + _FIRST_BEAT_S
@@ -85,19 +63,15 @@ class MavlinkFace:
         self._n_pings = 0
         self._ping_s = autopilot.boot_s
 
-    def __enter__(self) -> "MavlinkFace":
-        return self
+    def receive(self, data: bytes) -> None:
+        """Take a datagram: whole messages, so that a broken one does not spoil the next."""
+        parser: Any = dialect.MAVLink(None)
+        parser.robust_parsing = True
+        for message in parser.parse_buffer(data) or ():
+            self._receive(message)
 
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Let go of the port."""
-        self._socket.close()
-
-    def service(self) -> None:
-        """Read what came, carry out what is due, and send what is due."""
-        self._read()
+    def service(self) -> list[bytes]:
+        """Carry out what is due now, in the autopilot's time; returns the messages to send, in order."""
         now_s = self._autopilot.boot_s
         while self._commands and self._commands[0][0] <= now_s:
             _, message, command, params = self._commands.popleft()
@@ -116,22 +90,10 @@ class MavlinkFace:
             self._ping_s = now_s + 1.0
             self._send(self._mavlink.ping_encode(round(now_s * 1e6), self._n_pings, 0, 0))
             self._n_pings += 1
+        sent, self._outbox = self._outbox, []
+        return sent
 
     # --- in ---
-
-    def _read(self) -> None:
-        while True:
-            try:
-                data, address = self._socket.recvfrom(65535)
-            except (BlockingIOError, ConnectionRefusedError):
-                return
-            if address not in self._stations:
-                self._stations.append(address)
-            # A datagram holds whole messages, so a broken one must not spoil the next: each gets its own parser.
-            parser: Any = dialect.MAVLink(None)
-            parser.robust_parsing = True
-            for message in parser.parse_buffer(data) or ():
-                self._receive(message)
 
     def _receive(self, message: Any) -> None:
         handler = getattr(self, f"_on_{message.get_type().lower()}", None)
@@ -164,6 +126,11 @@ class MavlinkFace:
         elif message.type_mask & _IGNORE_POSITION == 0:
             yaw_rad = math.nan if message.type_mask & _IGNORE_YAW else message.yaw
             self._autopilot.set_position_setpoint(message.x, message.y, message.z, yaw_rad)
+
+    def _on_manual_control(self, message: Any) -> None:
+        if message.target in (0, _SYSTEM):
+            x, y, z, r = (value / 1000 for value in (message.x, message.y, message.z, message.r))
+            self._autopilot.set_sticks(x, y, z, r)
 
     def _on_param_request_read(self, message: Any) -> None:
         try:
@@ -242,13 +209,8 @@ class MavlinkFace:
     # --- out ---
 
     def _send(self, message: Any) -> None:
-        data = message.pack(self._mavlink)
+        self._outbox.append(message.pack(self._mavlink))
         self._mavlink.seq = (self._mavlink.seq + 1) % 256
-        for station in self._stations:
-            try:
-                self._socket.sendto(data, station)
-            except OSError:
-                continue  # a full queue or a station that went away loses messages, as any UDP link does
 
     def _send_stream(self, stream: Stream) -> bool:
         fields = stream.fields(self._autopilot)

@@ -13,6 +13,7 @@ from pymavlink.dialects.v20 import all as dialect
 from sitl.autopilot import SimAutopilot
 from sitl.mavlink import MavlinkFace
 from sitl.modes import Mode
+from sitl.udp import UdpLink
 
 STEP_S = 0.004
 ACCEPTED, REJECTED, DENIED, UNSUPPORTED = 0, 1, 2, 3
@@ -56,7 +57,7 @@ class Link:
             self.app = Station()
             self.autopilot = SimAutopilot(seed=2)
             try:
-                self.face = MavlinkFace(self.autopilot, self.app.port)
+                self.face = UdpLink(MavlinkFace(self.autopilot), self.app.port)
                 break
             except OSError:
                 self.app.socket.close()
@@ -380,9 +381,9 @@ def test_garbage_is_survived(link: Link) -> None:
 
 def test_a_taken_port_is_told_in_a_sentence(link: Link) -> None:
     with pytest.raises(OSError, match="choose another port"):
-        MavlinkFace(SimAutopilot(), link.app.port)
+        UdpLink(MavlinkFace(SimAutopilot()), link.app.port)
 
 
 def test_a_port_without_one_40_above_is_told_in_a_sentence() -> None:
     with pytest.raises(OSError, match="choose a port up to 65495"):
-        MavlinkFace(SimAutopilot(), 65500)
+        UdpLink(MavlinkFace(SimAutopilot()), 65500)
