@@ -152,8 +152,10 @@ def sitl(
     wind: WindOption = 0.0,
 ) -> None:
     """Run only the simulated vehicle, until Ctrl-C; any MAVLink program can fly it."""
-    from mission.simulation import WorldError, serve_until_stopped, world_path_or_name
+    from mission.simulation import SETUP, WorldError, serve_until_stopped, world_path_or_name
 
+    setup = ", ".join(f"{name} {value:g}" for name, value in SETUP.items())
+    typer.echo(f"Its parameters are PX4's defaults, but {setup}.", err=True)
     typer.echo(f"The simulated vehicle sends to udp 127.0.0.1:{port}; Ctrl-C ends it.", err=True)
     try:
         summary = serve_until_stopped(world_path_or_name(world), speed, port, seed, wind)
@@ -223,7 +225,7 @@ def _fly(setup: "FlightSetup") -> "FlightOutcome":
 
     try:
         with Watch(setup.mission.plan, Console(stderr=True)) as watch:
-            return asyncio.run(fly(setup, watch.show))
+            return asyncio.run(fly(setup, watch.show, watch.tell_checks))
     except LogError as error:
         _fail(str(error), EXIT_FAILED_FILE)
 

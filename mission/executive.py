@@ -7,17 +7,19 @@ task for the next step, and sends it. It never waits for vision. [Ceron] section
 import asyncio
 import contextlib
 import math
+from collections.abc import Callable, Sequence
 
 from drivers.camera.camera import Intrinsics
 from drivers.clock import NS_PER_S, Clock
 from mission import machine as m
 from mission.autopilot import Autopilot, AutopilotError, Setpoint, VehicleState
 from mission.build import build_task, guidance_settings, reactions, safety_limits
+from mission.checks import Check
 from mission.eyes import Eyes, Lookout
 from mission.helm import Helm
 from mission.plan import MissionPlan
 from mission.preflight import wait_until_ready
-from mission.records import Event, MissionEnded, Result, Severity, TaskEnded, TaskStarted
+from mission.records import CheckResult, Event, MissionEnded, PreflightCheck, Result, Severity, TaskEnded, TaskStarted
 from mission.reporting import FlightLog, Progress
 from mission.safety import Hazard, Reaction, SafetyInput, decide, find_hazards, keep_going_down, way_down
 from mission.tasks.go_down import GoDownTask
@@ -39,11 +41,24 @@ _RESULTS = {
 
 
 class Executive:
-    """Flies one mission; `run` once. `request_stop` may be called at any time from the event loop."""
+    """Flies one mission; `run` once. `request_stop` may be called at any time from the event loop.
+
+    `free_bytes` tells the room on the log's disk; `on_checks` hears the pre-flight checks once, before arming.
+    """
 
     def __init__(
-        self, plan: MissionPlan, autopilot: Autopilot, eyes: Eyes, log: FlightLog, clock: Clock, camera: Intrinsics
+        self,
+        plan: MissionPlan,
+        autopilot: Autopilot,
+        eyes: Eyes,
+        log: FlightLog,
+        clock: Clock,
+        camera: Intrinsics,
+        free_bytes: Callable[[], int | None] = lambda: None,
+        on_checks: Callable[[Sequence[Check]], None] = lambda checks: None,
     ) -> None:
+        self._free_bytes = free_bytes
+        self._on_checks = on_checks
         self._plan = plan
         self._autopilot = autopilot
         self._eyes = eyes
@@ -104,14 +119,19 @@ class Executive:
             self._lookout.keep_notices(self._clock.now_ns())
             self.progress = Progress(m.PREFLIGHT, None, None, None, waiting_for=missing)
 
-        missing = await wait_until_ready(
+        checks = await wait_until_ready(
             self._autopilot,
             self._eyes,
             self._clock,
-            self._plan.vehicle.ready_time_limit_s,
+            self._plan,
+            self._free_bytes,
             lambda: self._is_interrupted,
             tell,
         )
+        for check in checks:
+            self._log.record(PreflightCheck(self._clock.now_ns(), check.name, check.result, check.reason))
+        self._on_checks(checks)
+        missing = [check.line for check in checks if check.result is CheckResult.FAILED]
         state = self._autopilot.state
         if self._is_interrupted:
             await self._machine.trigger_named("interrupt")

@@ -114,6 +114,7 @@ def _interpolate(earlier: VehicleState, later: VehicleState, t_ns: int) -> Vehic
         landed=later.landed,
         battery=later.battery,
         is_connected=later.is_connected,
+        is_position_ok=later.is_position_ok,
     )
 
 

@@ -4,8 +4,9 @@ import asyncio
 import contextlib
 import functools
 import json
+import shutil
 import signal
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from datetime import UTC, datetime
 from pathlib import Path
@@ -15,6 +16,7 @@ from drivers.clock import ScaledClock
 from mission.autopilot import VehicleState
 from mission.autopilot_mavsdk import MavsdkAutopilot
 from mission.build import vision_settings
+from mission.checks import Check
 from mission.executive import Executive
 from mission.log.disk import log_path
 from mission.log.recorder import Recorder
@@ -64,8 +66,12 @@ class FlightOutcome:
     log_failure: str | None
 
 
-async def fly(setup: FlightSetup, on_progress: Callable[[Progress], None]) -> FlightOutcome:
+async def fly(
+    setup: FlightSetup, on_progress: Callable[[Progress], None], on_checks: Callable[[Sequence[Check]], None]
+) -> FlightOutcome:
     """Fly the mission. STOP_SIGNALS end it by the mission's reaction, not by killing this process.
+
+    `on_progress` hears a few times a second where the flight stands, `on_checks` once what pre-flight found.
 
     Raises LogError when the log cannot be made; then nothing was connected.
     """
@@ -86,7 +92,9 @@ async def fly(setup: FlightSetup, on_progress: Callable[[Progress], None]) -> Fl
         autopilot = MavsdkAutopilot(
             setup.connection, clock, lambda text: recorder.record_status_text(clock.now_ns(), f"mavsdk {text}")
         )
-        executive = Executive(plan, autopilot, eyes, recorder, clock, camera)
+        executive = Executive(
+            plan, autopilot, eyes, recorder, clock, camera, functools.partial(_free_bytes, path.parent), on_checks
+        )
         if setup.true_line is not None:
             recorder.record(setup.true_line)
         eyes.start()
@@ -106,6 +114,13 @@ async def fly(setup: FlightSetup, on_progress: Callable[[Progress], None]) -> Fl
                 eyes.stop()
         on_progress(executive.progress)
     return FlightOutcome(ended, executive.may_have_armed, path, recorder.failure)
+
+
+def _free_bytes(folder: Path) -> int | None:
+    try:
+        return shutil.disk_usage(folder).free
+    except OSError:
+        return None
 
 
 def _camera_words(camera: Intrinsics) -> dict[str, str]:
