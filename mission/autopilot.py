@@ -4,6 +4,7 @@ World frame: NED, origin where the autopilot's local frame has it. Yaw: from nor
 """
 
 import enum
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -28,6 +29,27 @@ class LandedState(enum.StrEnum):
     TAKING_OFF = "taking_off"
     IN_AIR = "in_air"
     LANDING = "landing"
+
+
+class AutopilotKind(enum.StrEnum):
+    """MAVLink's MAV_AUTOPILOT, as far as the mission tells them apart."""
+
+    UNKNOWN = "unknown"
+    PX4 = "px4"
+    ARDUPILOT = "ardupilot"
+
+
+@dataclass(frozen=True, slots=True)
+class Identity:
+    """Who flies the vehicle (MAVLink AUTOPILOT_VERSION); what was not told is empty.
+
+    `version` is major.minor.patch of the flight software, `uid` the hardware's own hexadecimal number: the same at
+    every start, another for every vehicle.
+    """
+
+    kind: AutopilotKind
+    version: str
+    uid: str
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,6 +138,14 @@ class Autopilot(Protocol):
 
     def missing_health(self) -> list[str]:
         """What keeps the vehicle from arming, in words for a person; empty when it can arm."""
+        ...
+
+    async def identify(self) -> Identity:
+        """Ask who flies the vehicle, once connected; an autopilot that does not tell is UNKNOWN, not an error."""
+        ...
+
+    async def read_parameters(self, names: Sequence[str]) -> dict[str, float]:
+        """Read parameters by name; those that the autopilot does not have, or does not tell, are absent."""
         ...
 
     async def arm(self) -> None:

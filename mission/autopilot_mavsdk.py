@@ -6,26 +6,51 @@ subscriptions must be cancelled before `destroy()`, or they hang for ever.
 """
 
 import asyncio
+import contextlib
+import json
 import math
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from typing import Any, TypeVar
 
+from mavsdk import Autopilot as MavsdkKind
 from mavsdk.asyncio import ComponentType, Configuration, Mavsdk, MavsdkConnectionError, MavsdkError
 from mavsdk.asyncio.plugins.action import ActionAsync
+from mavsdk.asyncio.plugins.info import InfoAsync
+from mavsdk.asyncio.plugins.mavlink_direct import MavlinkDirectAsync
 from mavsdk.asyncio.plugins.offboard import OffboardAsync, PositionNedYaw
+from mavsdk.asyncio.plugins.param import ParamAsync
 from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
 from mavsdk.logging import log_subscribe
+from mavsdk.plugins.param import ParamError, ParamResult
 from mavsdk.plugins.telemetry import FlightMode as MavsdkMode
 from mavsdk.plugins.telemetry import LandedState as MavsdkLanded
 
 from drivers.clock import Clock
-from mission.autopilot import AutopilotError, FlightMode, LandedState, NoAnswerError, Setpoint, VehicleState
+from mission.autopilot import (
+    AutopilotError,
+    AutopilotKind,
+    FlightMode,
+    GlobalPoint,
+    Identity,
+    LandedState,
+    NoAnswerError,
+    Setpoint,
+    VehicleState,
+)
 
 T = TypeVar("T")
 
 FIND_TIMEOUT_S = 20.0
 COMMAND_TIMEOUT_S = 5.0
 SETPOINT_TIMEOUT_S = 0.5
+IDENTIFY_TIMEOUT_S = 5.0
+ORIGIN_TIMEOUT_S = 3.0
+PARAMETER_TIMEOUT_S = 6.0
+"""MAVSDK itself asks for a parameter six times, which takes 3 s for one that the autopilot does not have."""
+
+_IDENTIFY_POLL_S = 0.2
+_AUTOPILOT_COMPONENT = 1  # MAV_COMP_ID_AUTOPILOT1
+_FAILSAFE_STATES = (5, 6)  # MAV_STATE_CRITICAL, MAV_STATE_EMERGENCY
 _TELEMETRY_RATE_HZ = 50.0
 _BATTERY_RATE_HZ = 2.0
 
@@ -38,6 +63,7 @@ _MODES = {
     MavsdkMode.LAND: FlightMode.LAND,
     MavsdkMode.OFFBOARD: FlightMode.OFFBOARD,
 }
+_KINDS = {MavsdkKind.PX4: AutopilotKind.PX4, MavsdkKind.ARDUPILOT: AutopilotKind.ARDUPILOT}
 _LANDED = {
     MavsdkLanded.UNKNOWN: LandedState.UNKNOWN,
     MavsdkLanded.ON_GROUND: LandedState.ON_GROUND,
@@ -67,10 +93,13 @@ class MavsdkAutopilot:
         self._clock = clock
         self._on_log = on_log
         self._mavsdk: Mavsdk | None = None
+        self._system: Any = None
         self._action: Any = None
         self._offboard: Any = None
         self._subscriptions: list[asyncio.Task[None]] = []
-        self._newest: dict[str, Any] = {"connected": True, "battery": None}
+        self._telemetry: Any = None
+        self._target: Setpoint | None = None
+        self._newest: dict[str, Any] = {"connected": True, "battery": None, "failsafe": False}
         self._position_ns = 0
         self._attitude_ns = 0
         self._status_texts: list[str] = []
@@ -99,7 +128,24 @@ class MavsdkAutopilot:
             landed=_LANDED.get(newest["landed"], LandedState.UNKNOWN),
             battery=newest["battery"],
             is_connected=newest["connected"],
+            is_failsafe=newest["failsafe"],
+            is_position_ok=self._is_position_ok(),
         )
+
+    @property
+    def target(self) -> Setpoint | None:
+        """Where the autopilot says that it flies to; None while it has not said."""
+        return self._target
+
+    async def read_origin(self) -> GlobalPoint | None:
+        """Where the local frame has its origin; None where the autopilot does not know."""
+        try:
+            origin = await self._call("tell its origin", self._telemetry.get_gps_global_origin(), ORIGIN_TIMEOUT_S)
+        except AutopilotError:
+            return None
+        if not all(map(math.isfinite, (origin.latitude_deg, origin.longitude_deg, origin.altitude_m))):
+            return None
+        return GlobalPoint(math.radians(origin.latitude_deg), math.radians(origin.longitude_deg), origin.altitude_m)
 
     def drain_status_texts(self) -> list[str]:
         """The autopilot's own words since the last call, oldest first."""
@@ -129,9 +175,11 @@ class MavsdkAutopilot:
         system = await self._mavsdk.first_autopilot(timeout_s=FIND_TIMEOUT_S)
         if system is None:
             raise AutopilotError(f"no autopilot was heard on {self._connection} within {FIND_TIMEOUT_S:g} s")
+        self._system = system
         self._action = ActionAsync(system)
         self._offboard = OffboardAsync(system)
-        telemetry = TelemetryAsync(system)
+        direct = MavlinkDirectAsync(system)
+        telemetry = self._telemetry = TelemetryAsync(system)
         streams: list[tuple[AsyncIterator[Any], Callable[[Any], None]]] = [
             (telemetry.subscribe_position_velocity_ned(), self._take_position),
             (telemetry.subscribe_attitude_euler(), self._take_attitude),
@@ -142,11 +190,42 @@ class MavsdkAutopilot:
             (telemetry.subscribe_battery(), self._take_battery),
             (telemetry.subscribe_status_text(), self._take_status_text),
             (system.is_connected_state(), self._keep("connected")),
+            (direct.subscribe_message("HEARTBEAT"), self._take_heartbeat),
+            (direct.subscribe_message("POSITION_TARGET_LOCAL_NED"), self._take_target),
         ]
         self._subscriptions = [asyncio.create_task(self._pump(stream, take)) for stream, take in streams]
         await self._call("set the rate of positions", telemetry.set_rate_position_velocity_ned(_TELEMETRY_RATE_HZ))
         await self._call("set the rate of attitudes", telemetry.set_rate_attitude_euler(_TELEMETRY_RATE_HZ))
         await self._call("set the rate of battery reports", telemetry.set_rate_battery(_BATTERY_RATE_HZ))
+
+    async def identify(self) -> Identity:
+        """Ask who flies the vehicle, once connected; an autopilot that does not tell is UNKNOWN, not an error."""
+        loop = asyncio.get_running_loop()
+        limit_s = loop.time() + IDENTIFY_TIMEOUT_S
+        kind = _KINDS.get(await self._system.autopilot_type(), AutopilotKind.UNKNOWN)
+        info = InfoAsync(self._system)
+        while loop.time() < limit_s:
+            with contextlib.suppress(AutopilotError):  # AUTOPILOT_VERSION has not come yet
+                version = await self._call("tell its version", info.get_version())
+                identification = await self._call("identify itself", info.get_identification())
+                uid = str(identification.hardware_uid)
+                return Identity(
+                    kind,
+                    f"{version.flight_sw_major}.{version.flight_sw_minor}.{version.flight_sw_patch}",
+                    # Older autopilots, and simulated ones, have the short number alone.
+                    uid if uid.strip("0") else f"{identification.legacy_uid:016x}",
+                )
+            await asyncio.sleep(_IDENTIFY_POLL_S)
+        return Identity(kind, "", "")
+
+    async def read_parameters(self, names: Sequence[str]) -> dict[str, float]:
+        """Read parameters by name; those that the autopilot does not have, or does not tell, are absent."""
+        param = ParamAsync(self._system)
+        found: dict[str, float] = {}
+        for name in names:
+            with contextlib.suppress(AutopilotError):
+                found[name] = await self._call(f"tell {name}", _read(param, name), PARAMETER_TIMEOUT_S)
+        return found
 
     async def arm(self) -> None:
         """Arm the motors."""
@@ -202,6 +281,10 @@ class MavsdkAutopilot:
                 raise NoAnswerError(f"the autopilot did not answer when asked to {what}") from None
             raise AutopilotError(f"the autopilot refused to {what}: {words}") from None
 
+    def _is_position_ok(self) -> bool:
+        health = self._newest.get("health")
+        return health is not None and health.is_local_position_ok and health.is_global_position_ok
+
     async def _pump(self, stream: AsyncIterator[Any], take: Callable[[Any], None]) -> None:
         async for item in stream:
             take(item)
@@ -224,9 +307,30 @@ class MavsdkAutopilot:
         percent = float(item.remaining_percent)
         self._newest["battery"] = None if math.isnan(percent) else percent / 100
 
+    def _take_heartbeat(self, message: Any) -> None:
+        """MAVSDK's own streams leave out the state of the system, which tells a failsafe from a pilot's choice."""
+        if message.component_id == _AUTOPILOT_COMPONENT:
+            self._newest["failsafe"] = json.loads(message.fields_json).get("system_status") in _FAILSAFE_STATES
+
+    def _take_target(self, message: Any) -> None:
+        fields = json.loads(message.fields_json)
+        place = [fields.get(key) for key in ("x", "y", "z", "yaw")]
+        if all(isinstance(value, int | float) and math.isfinite(value) for value in place):
+            self._target = Setpoint(*place)
+
     def _take_status_text(self, item: Any) -> None:
         self._status_texts.append(str(item.text).strip())
 
     def _take_log(self, level: Any, message: str, _file: str | None, _line: int) -> bool:
         self._on_log(f"{level.name}: {message}")
         return True
+
+
+async def _read(param: Any, name: str) -> float:
+    """A parameter of either type: MAVSDK wants the right one, and says at once when it was not."""
+    try:
+        return float(await param.get_param_float(name))
+    except ParamError as error:
+        if error.result is not ParamResult.WRONG_TYPE:
+            raise
+    return float(await param.get_param_int(name))

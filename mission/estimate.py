@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 
 from mission import plan as p
+from mission.reach import reaches_m
 
 _TURN_SETTLE_S = 2.0
 _ARRIVE_S = 3.0
@@ -23,6 +24,33 @@ class TaskEstimate:
     duration_s: float
     distance_m: float
     altitude_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class FlightTotals:
+    """A whole flight: time, way over ground, energy (hover power all the time), and how far and high it goes.
+
+    `reach_m` is the farthest from the take-off point, should every search go to its end (mission.reach).
+    """
+
+    duration_s: float
+    distance_m: float
+    energy_wh: float
+    reach_m: float
+    highest_m: float
+
+
+def total(plan: p.MissionPlan) -> FlightTotals:
+    """Sum up the estimate of a mission."""
+    estimates = estimate_mission(plan)
+    duration_s = sum(estimate.duration_s for estimate in estimates)
+    return FlightTotals(
+        duration_s=duration_s,
+        distance_m=sum(estimate.distance_m for estimate in estimates),
+        energy_wh=duration_s / 3600 * plan.vehicle.hover_power_w,
+        reach_m=max(reaches_m(plan)),
+        highest_m=max(estimate.altitude_m for estimate in estimates),
+    )
 
 
 def estimate_mission(plan: p.MissionPlan) -> list[TaskEstimate]:

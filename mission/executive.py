@@ -6,6 +6,7 @@ task for the next step, and sends it. It never waits for vision. [Ceron] section
 
 import asyncio
 import contextlib
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from drivers.camera.camera import Intrinsics
@@ -13,6 +14,7 @@ from drivers.clock import NS_PER_S, Clock
 from mission import machine as m
 from mission.autopilot import Autopilot, AutopilotError, Setpoint, VehicleState
 from mission.build import build_task, guidance_settings, reactions, safety_limits, search_settings, setpoint_limits
+from mission.checks import Check
 from mission.detours import Detour, detour_task
 from mission.eyes import Eyes
 from mission.hazards import TaskView, find_hazards
@@ -20,7 +22,7 @@ from mission.helm import Helm, UnsafeSetpointError
 from mission.logbook import Logbook
 from mission.plan import MissionPlan
 from mission.preflight import wait_until_ready
-from mission.records import Event, MissionEnded, Result, Severity, TaskEnded, TaskStarted
+from mission.records import Event, MissionEnded, PreflightCheck, Result, Severity, TaskEnded, TaskStarted
 from mission.reporting import FlightLog, Progress
 from mission.resumption import Resumption
 from mission.safety import PAUSES, Hazard, Reaction, decide, keep_going_down, way_down
@@ -66,15 +68,24 @@ class Executive:
     """Flies one mission; `run` once. `request_stop` may be called at any time from the event loop.
 
     With a `resumption` it takes an interrupted mission up again; `plan` then holds what is left of it.
+    `on_checks` hears the pre-flight checks once, before arming.
     """
 
-    def __init__(self, plan: MissionPlan, crew: Crew, clock: Clock, resumption: Resumption | None = None) -> None:
+    def __init__(
+        self,
+        plan: MissionPlan,
+        crew: Crew,
+        clock: Clock,
+        resumption: Resumption | None = None,
+        on_checks: Callable[[Sequence[Check]], None] = lambda checks: None,
+    ) -> None:
         self._plan = plan
         self._crew = crew
         self._autopilot = crew.autopilot
         self._log = crew.log
         self._clock = clock
         self._resumption = resumption
+        self._on_checks = on_checks
         self._guidance = guidance_settings(plan.guidance)
         self._limits = safety_limits(plan.safety)
         self._reactions = reactions(plan.safety)
@@ -92,8 +103,8 @@ class Executive:
         self._noted: set[Hazard] = set()
         self._end: tuple[Result, str] = (Result.FAILED, "")
         self.progress = Progress(m.PREFLIGHT, None, None, None)
-        self.tick_s = 0.0
-        """When the last control tick began, in the event loop's time [s]."""
+        self.tick_s: float | None = None
+        """When the last control tick began, in the event loop's time [s]; None before and after the flight."""
 
     @property
     def may_have_armed(self) -> bool:
@@ -119,6 +130,8 @@ class Executive:
                     with contextlib.suppress(AutopilotError):
                         await self._autopilot.hold()
                 raise
+            finally:
+                self.tick_s = None
             ended = MissionEnded(self._clock.now_ns(), *self._end)
         self._log.record(ended)
         return ended
@@ -130,43 +143,50 @@ class Executive:
             self._situation.keep_words()
             self.progress = Progress(m.PREFLIGHT, None, None, None, waiting_for=missing)
 
-        missing = await wait_until_ready(
+        ready = await wait_until_ready(
             self._autopilot,
             self._crew.eyes,
             self._clock,
-            self._plan.vehicle.ready_time_limit_s,
+            self._plan,
+            lambda: self._crew.computer().free_disk_bytes,
             lambda: self._situation.is_interrupted,
             tell,
             may_fly=self._resumption is not None,
         )
+        for check in ready.checks:
+            self._log.record(PreflightCheck(self._clock.now_ns(), check.name, check.result, check.reason))
+        self._on_checks(ready.checks)
         state = self._autopilot.state
         if self._situation.is_interrupted:
             await self._machine.trigger_named("interrupt")
             return MissionEnded(self._clock.now_ns(), Result.INTERRUPTED, "stopped before arming")
         words = None
-        if missing or state is None:
-            words = "not ready to fly: " + "; ".join(missing)
+        if ready.failures or state is None:
+            words = "not ready to fly: " + "; ".join(ready.failures)
         else:
-            words = await self._begin(state)
+            words = await self._begin(state, "" if ready.identity is None else ready.identity.uid)
         if words is not None:
             await self._machine.trigger_named("fail")
             return MissionEnded(self._clock.now_ns(), Result.FAILED, words)
         return None
 
-    async def _begin(self, state: VehicleState) -> str | None:
+    async def _begin(self, state: VehicleState, vehicle_uid: str) -> str | None:
         """Know where the flight begins; returns in a sentence why it must not."""
         here = Setpoint(state.north_m, state.east_m, state.down_m, state.yaw_rad)
         origin = await self._autopilot.read_origin()
         if self._resumption is not None:
             if origin is None:
                 return "the autopilot does not tell where on Earth it is, so that the mission cannot be resumed"
+            refusal = self._resumption.refusal(self._plan, state, vehicle_uid)
+            if refusal is not None:
+                return refusal
             memory, self._rejoin_at = self._resumption.locate(origin, here)
         else:
             theta_0_rad = self._guidance.theta_0_rad
             memory = FlightMemory(here, state.yaw_rad if theta_0_rad is None else theta_0_rad)
         self._situation.begin(memory)
         self._helm.start, self._helm.reference = memory.start, here
-        await self._crew.logbook.begin(origin, memory, self._resumption)
+        await self._crew.logbook.begin(origin, memory, vehicle_uid, self._resumption)
         return None
 
     # -- the control loop ----------------------------------------------------------------------------------------
@@ -270,7 +290,9 @@ class Executive:
         self._may_be_over_line = True
         self._task_started_ns = now_ns
         self._task = build_task(self._plan.tasks[resumption.index], self._guidance, self._situation.memory)
-        self._detour = Detour(RejoinTask(self._rejoin_at, self._guidance), None, Reaction.CONTINUE, now_ns)
+        transit_down_m = self._situation.memory.start.down_m - resumption.transit_height_m
+        rejoin = RejoinTask(self._rejoin_at, transit_down_m, self._guidance)
+        self._detour = Detour(rejoin, None, Reaction.CONTINUE, now_ns)
 
     async def _pause(self, hazard: Hazard, reaction: Reaction, words: str) -> None:
         """Pause the task: hold, climb and hold, or search."""

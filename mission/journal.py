@@ -167,8 +167,8 @@ class JournalError(Exception):
     """A journal cannot be read; the message is one sentence that says why and what to do."""
 
 
-def read_journal(path: Path) -> list[Begin | Transition | Standing]:
-    """The journal's entries, oldest first, the first a Begin. A last line that was cut off is left out.
+def read_journal(path: Path) -> tuple[Begin, list[Transition | Standing]]:
+    """How the journal begins, and its further entries, oldest first. A last line that was cut off is left out.
 
     Raises JournalError.
     """
@@ -185,9 +185,10 @@ def read_journal(path: Path) -> list[Begin | Transition | Standing]:
             entries.append(_ENTRY.validate_json(line))
         except ValidationError:
             raise JournalError(f"Line {number} of {path} is not a journal's; name a *{SUFFIX} of lineflight.") from None
-    if not entries or not isinstance(entries[0], Begin):
+    begin, *others = entries or [None]
+    if not isinstance(begin, Begin) or any(isinstance(entry, Begin) for entry in others):
         raise JournalError(f"The journal {path} does not say which mission was flown; nothing can be resumed from it.")
-    return entries
+    return begin, others
 
 
 def newest_journal(folder: Path) -> Path:

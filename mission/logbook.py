@@ -20,7 +20,6 @@ class FlightPapers:
     mission: str
     mission_path: str
     mission_sha256: str
-    vehicle_uid: str
     connection: str
     camera: str
     log: str
@@ -37,7 +36,9 @@ class Logbook:
         self._resumption: Resumption | None = None
         self._noted_ns: int | None = None
 
-    async def begin(self, origin: GlobalPoint | None, memory: FlightMemory, resumption: Resumption | None) -> None:
+    async def begin(
+        self, origin: GlobalPoint | None, memory: FlightMemory, vehicle_uid: str, resumption: Resumption | None
+    ) -> None:
         """The flight begins; `origin` is the local frame's. A `resumption` has done a part of its first task before."""
         self._origin, self._memory, self._resumption = origin, memory, resumption
         papers = self._papers
@@ -47,7 +48,7 @@ class Logbook:
                 mission=papers.mission,
                 mission_path=papers.mission_path,
                 mission_sha256=papers.mission_sha256,
-                vehicle_uid=papers.vehicle_uid,
+                vehicle_uid=vehicle_uid,
                 connection=papers.connection,
                 camera=papers.camera,
                 log=papers.log,

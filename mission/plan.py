@@ -125,13 +125,30 @@ TASK_MODELS: dict[str, type[BaseModel]] = {
 """The section of each task, by its name in the file."""
 
 
+ParameterCheck = Literal[
+    "offboard_loss_time",
+    "offboard_loss_action",
+    "stick_takeover",
+    "return_altitude",
+    "speeds",
+    "autopilot_fence",
+    "low_battery_action",
+]
+"""The pre-flight checks of the autopilot's parameters (mission/parameter_checks.py)."""
+
+
 class VehiclePlan(_Section):
-    """The link to the autopilot."""
+    """The link to the autopilot, and the battery; the defaults suit a hexacopter of the DJI F550's class."""
 
     connection: str = Field(
         "udpin://0.0.0.0:14540", description="MAVSDK connection URL, e.g. serial:///dev/ttyAMA0:921600."
     )
     ready_time_limit_s: TimeLimitS = Field(180.0, description="How long to wait until the vehicle can arm.")
+    battery_wh: float = Field(75.0, gt=0, le=10000, description="Energy of the full battery, e.g. 4S 5.2 Ah: 75 Wh.")
+    hover_power_w: float = Field(350.0, gt=0, le=20000, description="Power that hovering takes, avionics included.")
+    accept: list[ParameterCheck] = Field(
+        [], max_length=20, description="Pre-flight checks of parameters that only warn where they would refuse to fly."
+    )
 
 
 class CameraPlan(_Section):
@@ -253,6 +270,10 @@ class SafetyPlan(_Section):
 
     max_distance_m: float = Field(150.0, gt=0, le=2000, description="Radius of the fence around the take-off point.")
     max_altitude_m: AltitudeM = Field(60.0, description="Height of the fence above the take-off point.")
+    line_height_m: float | None = Field(
+        None, gt=0, le=110, description="Top of the line, wires and poles, above the take-off point; else not checked."
+    )
+    min_clearance_m: float = Field(3.0, gt=0, le=50, description="Room to keep above line_height_m.")
     line_lost_s: float = Field(
         3.0, gt=0, le=60, description="No estimate for so long while following: the line is lost."
     )

@@ -1,82 +1,150 @@
-"""Before arming: connect, and wait until the vehicle can arm and vision sees."""
+"""Before arming: connect, find out the facts, and wait until every check has passed."""
 
 import asyncio
-from collections.abc import Callable
+import time
+from collections import deque
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 
-from drivers.clock import Clock
-from mission.autopilot import Autopilot, AutopilotError, FlightMode, LandedState, VehicleState
+from drivers.clock import NS_PER_S, Clock
+from mission.autopilot import Autopilot, AutopilotError, AutopilotKind, Identity
+from mission.checks import Check
 from mission.eyes import Eyes
+from mission.parameter_checks import NAMES
+from mission.plan import MissionPlan
+from mission.preflight_checks import Facts, check_all, not_at_rest
+from mission.records import CheckResult
+from vision.records import VisionReport
+
+__all__ = ["not_at_rest", "wait_until_ready"]
 
 _POLL_S = 0.2
+_FINAL_AFTER_S = 1.0
+"""A failure that waiting does not mend must have stood so long [s, wall]: first telemetry may be half of the truth."""
+
+_FRAMES_WINDOW = 30
+_MIN_FRAMES = 3
 
 
-def not_at_rest(state: VehicleState) -> str | None:
-    """Why a vehicle must not be armed by us now, in words; None when it stands disarmed on the ground.
+@dataclass(frozen=True, slots=True)
+class Readiness:
+    """What the checks found, and who flies the vehicle (None: it did not say)."""
 
-    A vehicle that is armed or in the air is in somebody's hands: arming and take-off would take it from them.
-    """
-    if state.is_armed:
-        return "the vehicle to be disarmed (it is armed: somebody may be flying it)"
-    if state.landed is not LandedState.ON_GROUND:
-        return "the vehicle to stand on the ground"
-    return None
+    checks: list[Check]
+    identity: Identity | None
+
+    @property
+    def failures(self) -> list[str]:
+        """What keeps the vehicle on the ground, in sentences; empty when it may be armed."""
+        return [check.line for check in self.checks if check.result is CheckResult.FAILED]
 
 
-def is_handed_over(state: VehicleState) -> bool:
-    """Whether a pilot has left a flying vehicle hovering in hold mode, from where a mission may be resumed."""
-    return state.is_armed and state.landed is LandedState.IN_AIR and state.mode is FlightMode.HOLD
+class _Answers:
+    """What the autopilot answered so far; `failure` says why there is no link."""
+
+    def __init__(self) -> None:
+        self.is_linked = False
+        self.failure: str | None = None
+        self.identity: Identity | None = None
+        self.parameters: Mapping[str, float] | None = None
+
+    async def ask(self, autopilot: Autopilot) -> None:
+        """Connect, then ask who it is and for its parameters; seconds of wall time, beside everything else."""
+        try:
+            await autopilot.connect()
+            self.is_linked = True
+            self.identity = await autopilot.identify()
+            if self.identity.kind is AutopilotKind.PX4:
+                self.parameters = await autopilot.read_parameters(NAMES)
+        except AutopilotError as error:
+            self.failure = str(error)
+
+
+class _FrameRate:
+    """The camera's rate from the frames that vision saw lately, those counted that it had no time for."""
+
+    def __init__(self) -> None:
+        self._seen: deque[tuple[int, int]] = deque(maxlen=_FRAMES_WINDOW)
+
+    def add(self, reports: list[VisionReport]) -> None:
+        """Take the newest reports."""
+        for report in reports:
+            if self._seen and report.seq <= self._seen[-1][0]:
+                self._seen.clear()  # the camera was opened again
+            self._seen.append((report.seq, report.t_capture_ns))
+
+    @property
+    def hz(self) -> float | None:
+        """Frames a second of flight time; None before there were a few."""
+        if len(self._seen) < _MIN_FRAMES:
+            return None
+        (first, first_ns), (last, last_ns) = self._seen[0], self._seen[-1]
+        return (last - first) * NS_PER_S / (last_ns - first_ns) if last_ns > first_ns else None
 
 
 async def wait_until_ready(
     autopilot: Autopilot,
     eyes: Eyes,
     clock: Clock,
-    time_limit_s: float,
+    plan: MissionPlan,
+    free_bytes: Callable[[], int | None],
     is_stopped: Callable[[], bool],
     tell: Callable[[tuple[str, ...]], None],
     *,
     may_fly: bool = False,
-) -> list[str]:
-    """Connect and wait; returns what is still missing after `time_limit_s` [s, wall], empty when all is ready.
+) -> Readiness:
+    """Connect, wait, and return what every check found; the vehicle may be armed when none of them has failed.
 
-    Compiling and connecting take wall time, however fast the flight's clock runs. Returns early when `is_stopped`, and
-    when vision or the link has failed for good; `tell` hears what is being waited for.
+    Waits for what may still come, at most vehicle.ready_time_limit_s [s, wall]: compiling and connecting take wall
+    time, however fast the flight's clock runs. Returns early when `is_stopped`, and when a check has failed for good.
+    `free_bytes` tells the room that the log has; `tell` hears what is being waited for. A mission that is resumed
+    `may_fly` already.
     """
     loop = asyncio.get_running_loop()
-    limit_s = loop.time() + time_limit_s
-    connecting = asyncio.create_task(autopilot.connect())
+    limit_s = loop.time() + plan.vehicle.ready_time_limit_s
+    answers, frames = _Answers(), _FrameRate()
+    asking = asyncio.create_task(answers.ask(autopilot))
+    final_since_s: float | None = None
     try:
-        while not is_stopped():
-            if eyes.failure is not None:
-                return [eyes.failure]
-            if connecting.done():
-                connecting.result()
-                missing = _missing(autopilot, eyes, may_fly=may_fly)
-            else:
-                missing = ["an autopilot on the link"]
-            eyes.take()
-            tell(tuple(missing))
-            if not missing or loop.time() > limit_s:
-                return missing
+        while True:
+            frames.add(eyes.take())
+            checks = check_all(_facts(autopilot, eyes, answers, frames, free_bytes(), may_fly=may_fly), plan)
+            tell(tuple(check.waits_for for check in checks if check.waits_for))
+            now_s = loop.time()
+            has_failed = any(check.result is CheckResult.FAILED for check in checks)
+            is_final = any(check.is_final for check in checks)
+            final_since_s = None if not is_final else now_s if final_since_s is None else final_since_s
+            is_over = final_since_s is not None and now_s - final_since_s >= _FINAL_AFTER_S
+            if not has_failed or is_over or is_stopped() or now_s > limit_s:
+                return Readiness(checks, answers.identity)
+            if asking.done():
+                asking.result()  # a bug in there is ours to hear of
             await asyncio.sleep(clock.wall_s(_POLL_S))
-    except AutopilotError as error:
-        return [str(error)]
     finally:
-        connecting.cancel()
-        await asyncio.gather(connecting, return_exceptions=True)
-    return ["the operator asked to stop"]
+        asking.cancel()
+        await asyncio.gather(asking, return_exceptions=True)
 
 
-def _missing(autopilot: Autopilot, eyes: Eyes, *, may_fly: bool) -> list[str]:
-    missing = autopilot.missing_health()
-    state = autopilot.state
-    rest = "telemetry" if state is None else not_at_rest(state)
-    if may_fly and state is not None and not is_handed_over(state):
-        rest = rest and f"{rest}, or to hover in hold mode"
-    elif may_fly and rest is not None and state is not None:
-        rest = None
-    if rest is not None:
-        missing.append(rest)
-    if eyes.missing is not None:
-        missing.append(eyes.missing)
-    return missing
+def _facts(
+    autopilot: Autopilot,
+    eyes: Eyes,
+    answers: _Answers,
+    frames: _FrameRate,
+    free_bytes: int | None,
+    *,
+    may_fly: bool,
+) -> Facts:
+    return Facts(
+        is_linked=answers.is_linked,
+        link_failure=answers.failure,
+        identity=answers.identity,
+        parameters=answers.parameters,
+        state=autopilot.state if answers.is_linked else None,
+        missing_health=tuple(autopilot.missing_health()) if answers.is_linked else (),
+        vision_failure=eyes.failure,
+        vision_missing=eyes.missing,
+        frames_hz=frames.hz,
+        free_bytes=free_bytes,
+        unix_s=time.time(),
+        may_fly=may_fly,
+    )

@@ -22,6 +22,24 @@ class Severity(enum.StrEnum):
     ERROR = "error"
 
 
+class CheckResult(enum.StrEnum):
+    """How a pre-flight check ended: a warning does not keep the vehicle on the ground."""
+
+    OK = "ok"
+    WARNING = "warning"
+    FAILED = "failed"
+
+
+@dataclass(frozen=True, slots=True)
+class PreflightCheck:
+    """What a pre-flight check found; `reason` is a sentence that a person can act on."""
+
+    t_ns: int
+    name: str
+    result: CheckResult
+    reason: str
+
+
 @dataclass(frozen=True, slots=True)
 class Event:
     """Something that happened; `name` is one of the table in docs/safety.md, `reaction` what was done about it."""

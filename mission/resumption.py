@@ -3,6 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
+from datetime import datetime
 
 from mission import plan as p
 from mission.autopilot import GlobalPoint, LandedState, Setpoint, VehicleState
@@ -25,7 +26,8 @@ class CannotResumeError(Exception):
 class Resumption:
     """Where an interrupted mission is taken up again: at `place`, with the task and its progress that `standing` tells.
 
-    `start` is where the mission took off; its heights, its fence and its way home are measured from there.
+    `start` is where the mission took off; its heights, its fence and its way home are measured from there. The way to
+    `place` is flown `transit_height_m` above it, as high as the mission flies anywhere: the line may lie between.
     """
 
     standing: Standing
@@ -33,6 +35,7 @@ class Resumption:
     start: Place
     theta_0_rad: float
     vehicle_uid: str
+    transit_height_m: float
 
     @property
     def index(self) -> int:
@@ -60,16 +63,13 @@ class Resumption:
 
 
 def find_resumption(
-    entries: Sequence[Begin | Transition | Standing], plan: p.MissionPlan, mission_sha256: str
+    begin: Begin, entries: Sequence[Transition | Standing], plan: p.MissionPlan, mission_sha256: str
 ) -> tuple[p.MissionPlan, Resumption]:
     """What is left of the mission, and where to take it up. Raises CannotResumeError.
 
-    `entries` are a journal's, `plan` and `mission_sha256` those of the mission file as it is now. A task that can
-    simply be done again (a climb, an alignment) is; of the others the rest is left.
+    `begin` and `entries` are a journal's, `plan` and `mission_sha256` those of the mission file as it is now. A task
+    that can simply be done again (a climb, an alignment) is; of the others the rest is left.
     """
-    begin = entries[0]
-    if not isinstance(begin, Begin):
-        raise CannotResumeError("the journal does not say which mission was flown")
     if begin.mission_sha256 != mission_sha256:
         raise CannotResumeError(
             f"the mission file {begin.mission_path} has changed since; fly it from its beginning with lineflight run"
@@ -80,9 +80,7 @@ def find_resumption(
         unix_s=begin.unix_s, task_index=0, progress=0.0, move_until_m=None, place=begin.start
     )
     has_rejoined = begin.resumed is None
-    for entry in entries[1:]:
-        if isinstance(entry, Begin):
-            continue
+    for entry in entries:
         target = entry.target if isinstance(entry, Transition) else ""
         if target == COMPLETED:
             raise CannotResumeError("the mission was completed; nothing is left to do")
@@ -97,8 +95,45 @@ def find_resumption(
     index = standing.task_index
     tasks[index] = left_of(tasks[index], standing.progress, standing.move_until_m)
     place = standing.place or begin.start
-    resumption = Resumption(standing, place, begin.start, begin.theta_0_rad, begin.vehicle_uid)
+    heights_m = [getattr(task, "altitude_m", 0.0) for task in plan.tasks]
+    transit_height_m = max(*heights_m, place.height_m)
+    resumption = Resumption(standing, place, begin.start, begin.theta_0_rad, begin.vehicle_uid, transit_height_m)
     return plan.model_copy(update={"tasks": tasks}), resumption
+
+
+def explain_resumption(plan: p.MissionPlan, resumption: Resumption, begin: Begin) -> list[str]:
+    """What resuming would do and why, in lines for a person. `plan` is what is left."""
+    standing, task = resumption.standing, plan.tasks[resumption.index]
+    when = datetime.fromtimestamp(standing.unix_s).astimezone()
+    lines = [
+        f"mission  {begin.mission} ({begin.mission_path}), interrupted {when:%Y-%m-%d %H:%M:%S}",
+        f"vehicle  {resumption.vehicle_uid or 'unknown'}; another one is refused",
+        f"stands   in task {resumption.index + 1}, {task.task}{_done_words(task, standing.progress)}, "
+        f"{resumption.place.height_m:.1f} m above the take-off point",
+    ]
+    left = [each.task for each in plan.tasks[resumption.index :]]
+    height_m = resumption.transit_height_m
+    if resumption.index == 0:
+        lines.append("resume   begins with the take-off, because that was not over")
+    else:
+        lines.append(
+            f"resume   on the ground: takes off, flies at {height_m:.1f} m to where it was interrupted, and goes on"
+        )
+        lines.append(f"         hovering in hold mode: flies there from where it is, at {height_m:.1f} m, and goes on")
+    lines.append("left     " + ", ".join(left))
+    return lines
+
+
+def _done_words(task: p.AnyTask, progress: float) -> str:
+    match task:
+        case p.FollowLines() | p.MoveUntil() | p.MoveForward() if progress > 0:
+            return f" ({progress:.1f} m of it done)"
+        case p.Rotate() if progress != 0:
+            return f" ({math.degrees(progress):.0f} degrees of it done)"
+        case p.Hold() if progress > 0:
+            return f" ({progress:.0f} s of it done)"
+        case _:
+            return ""
 
 
 def _standing_after(entry: Transition | Standing, before: Standing) -> Standing:

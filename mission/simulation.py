@@ -26,9 +26,19 @@ from sitl.control import quaternion_of
 from sitl.map import render_map
 from sitl.pose import Pose, PoseBlock
 from sitl.server import SitlSettings, SitlSummary, run
+from sitl.setup import SETUP
 from sitl.world import World, WorldError, load_world
 
-__all__ = ["Simulation", "TelemetryCamera", "World", "WorldError", "draw_map", "serve_until_stopped", "true_line"]
+__all__ = [
+    "SETUP",
+    "Simulation",
+    "TelemetryCamera",
+    "World",
+    "WorldError",
+    "draw_map",
+    "serve_until_stopped",
+    "true_line",
+]
 
 VEHICLE_PORT_ABOVE = 40
 """The simulated vehicle binds this far above the application's port, as PX4 SITL does (14580 and 14540)."""
@@ -131,6 +141,7 @@ def sitl_settings(
         start_yaw_rad=world.start_yaw_rad,
         origin=world.origin,
         pose_block=pose_block,
+        parameters=tuple(SETUP.items()),
     )
 
 

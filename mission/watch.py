@@ -2,7 +2,9 @@
 
 import contextlib
 import math
+import queue
 import threading
+from collections.abc import Sequence
 from types import TracebackType
 from typing import Self
 
@@ -11,11 +13,14 @@ from rich.live import Live
 from rich.text import Text
 
 from drivers.camera.mailbox import Mailbox
+from mission.checks import Check
 from mission.plan import MissionPlan
+from mission.records import CheckResult
 from mission.reporting import Progress
 
 _POLL_S = 0.2
 _LAST_WORD_S = 1.0
+_STYLES = {CheckResult.WARNING: "yellow", CheckResult.FAILED: "bold red"}
 
 
 class Watch:
@@ -31,11 +36,18 @@ class Watch:
         self._shown: tuple[str, tuple[str, ...]] = ("", ())
         self._live = Live(console=console, auto_refresh=False, transient=True) if console.is_terminal else None
         self._news: Mailbox[Progress] = Mailbox()
+        self._checks: queue.SimpleQueue[Check] = queue.SimpleQueue()
         self._thread = threading.Thread(target=self._print_all, name="watch", daemon=True)
 
     def show(self, progress: Progress) -> None:
         """Show where the flight stands, soon; never waits."""
         self._news.put(progress)
+
+    def tell_checks(self, checks: Sequence[Check]) -> None:
+        """Print what pre-flight warns of, and what it found wrong, soon; never waits."""
+        for check in checks:
+            if check.result is not CheckResult.OK:
+                self._checks.put(check)
 
     def __enter__(self) -> Self:
         self._thread.start()
@@ -52,8 +64,15 @@ class Watch:
         with contextlib.suppress(EOFError, OSError), self._live or contextlib.nullcontext():
             while True:
                 progress = self._news.get(_POLL_S)
+                self._print_checks()
                 if progress is not None:
                     self._print(progress)
+
+    def _print_checks(self) -> None:
+        while not self._checks.empty():
+            check = self._checks.get()
+            text = Text.assemble((f"       {check.result:<14}", _STYLES[check.result]), check.line)
+            self._console.print(text, soft_wrap=True, highlight=False)
 
     def _print(self, progress: Progress) -> None:
         if self._live is not None:

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from drivers.clock import NS_PER_S, ScaledClock
 from sitl.autopilot import SimAutopilot
 from sitl.mavlink import MavlinkFace
+from sitl.parameters import Parameters
 from sitl.place import Origin
 from sitl.pose import Pose, PoseBlock
 from sitl.udp import UdpLink
@@ -25,7 +26,8 @@ class SitlSettings:
 
     `port` is the application's UDP port; `wind_m_s` the mean wind at 20 ft, whose direction `seed` draws;
     `start_yaw_rad` the heading at start; `origin` places the world's NED frame, where the vehicle stands at start;
-    `pose_block` names the shared memory that gets the true pose (None: nobody looks).
+    `pose_block` names the shared memory that gets the true pose (None: nobody looks); `parameters` are set over PX4's
+    defaults.
     """
 
     port: int
@@ -35,6 +37,7 @@ class SitlSettings:
     start_yaw_rad: float
     origin: Origin
     pose_block: str | None
+    parameters: tuple[tuple[str, float | int], ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -61,6 +64,7 @@ def run(settings: SitlSettings, should_stop: Callable[[], bool]) -> SitlSummary:
         Vehicle(yaw_rad=settings.start_yaw_rad),
         Wind(settings.wind_m_s, settings.seed),
         seed=settings.seed,
+        parameters=Parameters(dict(settings.parameters)),
         origin=settings.origin,
         speed=max(1.0, clock.speed),
     )

@@ -9,7 +9,7 @@ from drivers.clock import NS_PER_S
 from drivers.mcap_stream import IMAGE_TOPIC
 from mission.autopilot import VehicleState
 from mission.log.records import LoggedMission, SentSetpoint, StatusText, VisionEntry
-from mission.records import Event, MissionEnded, TaskEnded, TaskStarted, TrueLine, TruePose
+from mission.records import Event, MissionEnded, PreflightCheck, TaskEnded, TaskStarted, TrueLine, TruePose
 
 PROFILE = "lineflight"
 
@@ -41,6 +41,7 @@ class FoxgloveChannel:
 
 RECORD_CHANNELS = (
     RecordChannel("/mission", LoggedMission, "the mission file, and how log times belong to flight times", "once"),
+    RecordChannel("/preflight/check", PreflightCheck, "what each check before arming found", "once each"),
     RecordChannel("/vehicle/state", VehicleState, "the vehicle as telemetry tells it", "every control tick"),
     RecordChannel("/setpoint", SentSetpoint, "the offboard setpoints", "every control tick while offboard"),
     RecordChannel("/vision/report", VisionEntry, "line estimates and power lines", "every frame worked on"),

@@ -14,7 +14,7 @@ from mission.autopilot import VehicleState
 from mission.log import channels
 from mission.log.errors import LogError
 from mission.log.records import LoggedMission, SentSetpoint, StatusText, VisionEntry
-from mission.records import Event, MissionEnded, TaskEnded, TaskStarted, TrueLine, TruePose
+from mission.records import Event, MissionEnded, PreflightCheck, TaskEnded, TaskStarted, TrueLine, TruePose
 from vision.records import VisionReport
 
 
@@ -28,6 +28,7 @@ class Flight:
 
     path: Path
     mission: LoggedMission
+    checks: tuple[PreflightCheck, ...]
     states: tuple[VehicleState, ...]
     setpoints: tuple[SentSetpoint, ...]
     reports: tuple[VisionReport, ...]
@@ -95,6 +96,7 @@ def _flight(path: Path, streams: dict[type, list[Any]], jpegs: dict[int, bytes],
     return Flight(
         path=path,
         mission=mission,
+        checks=tuple(streams[PreflightCheck]),
         states=tuple(streams[VehicleState]),
         setpoints=tuple(streams[SentSetpoint]),
         reports=tuple(_report(entry, jpegs.get(entry.t_ns + offset_ns)) for entry in streams[VisionEntry]),

@@ -23,7 +23,7 @@ from mission.log.backlog import Backlog
 from mission.log.disk import LogFile
 from mission.log.records import LoggedMission, SentSetpoint, StatusText, VisionEntry
 from mission.log.wording import line_of
-from mission.records import Event, MissionEnded, Severity, TaskEnded, TaskStarted, TrueLine, TruePose
+from mission.records import Event, MissionEnded, PreflightCheck, Severity, TaskEnded, TaskStarted, TrueLine, TruePose
 from vision.records import VisionReport
 
 _MAX_RECORDS = 20_000  # a minute or more of all streams
@@ -286,6 +286,7 @@ _WRITE: dict[type, Callable[[_FlightLog, Any], None]] = {
     VehicleState: _FlightLog.write_state,
     SentSetpoint: _FlightLog.write_plain,
     VisionReport: _FlightLog.write_vision,
+    PreflightCheck: _FlightLog.write_worded,
     TaskStarted: _FlightLog.write_worded,
     TaskEnded: _FlightLog.write_worded,
     MissionEnded: _FlightLog.write_worded,

@@ -22,6 +22,9 @@ def print_report(report: FlightReport, console: Console) -> None:
     console.print()
     console.print(heading, width=width)
     console.print(Text(report.reason, style="dim"), width=width)
+    for style, lines in (("bold red", report.preflight.failures), ("yellow", report.preflight.warnings)):
+        for line in lines:
+            console.print(Text.assemble(("pre-flight  ", "dim"), (line, style)), width=width)
     if report.is_truncated:
         console.print(Text("The log was cut off; this is what it still holds.", style="yellow"), width=width)
     is_troubled = any(event.severity != Severity.INFO for event in report.events)

@@ -9,7 +9,8 @@ import numpy as np
 from drivers.clock import NS_PER_S
 from mission.log.measures import Floats, line_fit_distances_m, nearest_on_axis, offboard_gaps_s
 from mission.log.reader import Flight
-from mission.records import TaskEnded, TrueLine
+from mission.log.wording import words_of
+from mission.records import CheckResult, TaskEnded, TrueLine
 from vision.records import Track, wrap_line_angle_rad
 
 FOLLOW_TASK = "follow_lines"
@@ -106,6 +107,15 @@ class LandingSummary:
 
 
 @dataclass(frozen=True, slots=True)
+class PreflightSummary:
+    """How many checks there were before arming, and what those said that were not fine."""
+
+    n_checks: int
+    warnings: tuple[str, ...]
+    failures: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class EventSummary:
     """An event; `t_s` [s] from the log's start."""
 
@@ -128,6 +138,7 @@ class FlightReport:
     reason: str
     is_truncated: bool
     duration_s: float
+    preflight: PreflightSummary
     tasks: tuple[TaskSummary, ...]
     legs: tuple[LegSummary, ...]
     lateral: LateralSummary | None
@@ -155,6 +166,7 @@ def summarise(flight: Flight) -> FlightReport:
         reason="The log breaks off before the mission ended." if ended is None else ended.reason,
         is_truncated=flight.is_truncated,
         duration_s=since_start_s(end_ns),
+        preflight=_preflight(flight),
         tasks=tuple(
             TaskSummary(
                 span.task,
@@ -209,6 +221,13 @@ def task_spans(flight: Flight) -> tuple[TaskSpan, ...]:
 def true_axis(line: TrueLine) -> Floats:
     """Return the line's axis as an array (m, 2) of north, east [m]."""
     return np.array(line.axis_ne_m, dtype=np.float64).reshape(-1, 2)
+
+
+def _preflight(flight: Flight) -> PreflightSummary:
+    def said(result: CheckResult) -> tuple[str, ...]:
+        return tuple(f"{words_of(check.name)}: {check.reason}" for check in flight.checks if check.result is result)
+
+    return PreflightSummary(len(flight.checks), said(CheckResult.WARNING), said(CheckResult.FAILED))
 
 
 def _legs(flight: Flight, following: list[tuple[int, int]]) -> tuple[LegSummary, ...]:

@@ -3,9 +3,24 @@
 from typing import assert_never
 
 from mission.log.records import StatusText
-from mission.records import Event, MissionEnded, Result, Severity, TaskEnded, TaskStarted
+from mission.records import (
+    CheckResult,
+    Event,
+    MissionEnded,
+    PreflightCheck,
+    Result,
+    Severity,
+    TaskEnded,
+    TaskStarted,
+)
 
-Worded = Event | TaskStarted | TaskEnded | MissionEnded | StatusText
+Worded = PreflightCheck | Event | TaskStarted | TaskEnded | MissionEnded | StatusText
+
+_CHECK_SEVERITY = {
+    CheckResult.OK: Severity.INFO,
+    CheckResult.WARNING: Severity.WARNING,
+    CheckResult.FAILED: Severity.ERROR,
+}
 
 
 def line_of(record: Worded) -> tuple[str, Severity, str]:
@@ -14,6 +29,8 @@ def line_of(record: Worded) -> tuple[str, Severity, str]:
         case Event():
             reaction = "" if record.reaction == "continue" else f" [{record.reaction}]"
             return "event", record.severity, f"{record.name}: {record.message}{reaction}"
+        case PreflightCheck():
+            return "preflight", _CHECK_SEVERITY[record.result], f"{words_of(record.name)}: {record.reason}"
         case TaskStarted():
             return "mission", Severity.INFO, f"{record.task} started"
         case TaskEnded():

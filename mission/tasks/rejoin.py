@@ -9,14 +9,18 @@ from mission.tasks.walk import Walk
 
 
 class RejoinTask:
-    """Goes there high: up first, then across, then down, so that nothing that stands between is met."""
+    """Goes there high: up first, then across, then down, so that nothing that stands between is met.
+
+    It crosses at `transit_down_m` NED, or higher where it is higher already.
+    """
 
     needs_line = False
     needs_vision = False
     progress = 0.0
 
-    def __init__(self, goal: Setpoint, guidance: GuidanceSettings) -> None:
+    def __init__(self, goal: Setpoint, transit_down_m: float, guidance: GuidanceSettings) -> None:
         self._goal = goal
+        self._transit_down_m = transit_down_m
         self._guidance = guidance
         self._walk: Walk | None = None
 
@@ -24,7 +28,7 @@ class RejoinTask:
         """Walk; done at the goal."""
         if self._walk is None:
             goal = self._goal
-            up = replace(reference, down_m=min(reference.down_m, goal.down_m))
+            up = replace(reference, down_m=min(reference.down_m, self._transit_down_m))
             above = replace(goal, down_m=up.down_m, yaw_rad=up.yaw_rad)
             self._walk = Walk([up, above, goal], self._guidance)
         setpoint = self._walk.step(reference, seen)

@@ -93,7 +93,7 @@ class Cockpit:
     computer: Computer
 
 
-PAPERS = FlightPapers("test", "test.yaml", "00", "uid", "in-process", "geometric", "none")
+PAPERS = FlightPapers("test", "test.yaml", "00", "in-process", "geometric", "none")
 
 
 def shipped(name: str) -> MissionPlan:

@@ -4,13 +4,15 @@ It shows what MAVLink would: mode and armed state are told once a second, as PX4
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
 from drivers.clock import Clock
 from mission.autopilot import (
     AutopilotError,
+    AutopilotKind,
     FlightMode,
     GlobalPoint,
+    Identity,
     LandedState,
     NoAnswerError,
     Setpoint,
@@ -18,6 +20,8 @@ from mission.autopilot import (
 )
 from sitl.autopilot import SimAutopilot
 from sitl.modes import Answer, Landed, Mode
+from sitl.parameters import Parameters
+from sitl.setup import SETUP
 from sitl.vehicle import Vehicle, euler_of
 from sitl.wind import Wind
 
@@ -42,7 +46,9 @@ class InProcessAutopilot:
 
     def __init__(self, clock: Clock, *, start_yaw_rad: float = 0.0, wind_m_s: float = 0.0, seed: int = 1) -> None:
         self._clock = clock
-        self.sim = SimAutopilot(Vehicle(yaw_rad=start_yaw_rad), Wind(wind_m_s, seed), seed=seed)
+        self.sim = SimAutopilot(
+            Vehicle(yaw_rad=start_yaw_rad), Wind(wind_m_s, seed), seed=seed, parameters=Parameters(SETUP)
+        )
         self._heartbeat: tuple[Mode, bool] = (self.sim.mode, False)
         self._heartbeat_s = 0.0
         self._heartbeat_failsafe = False
@@ -103,6 +109,7 @@ class InProcessAutopilot:
             self.sim.battery.remaining,
             self.is_connected,
             is_failsafe=self._heartbeat_failsafe,
+            is_position_ok=self.sim.is_position_ok,
         )
 
     @property
@@ -123,6 +130,14 @@ class InProcessAutopilot:
     def missing_health(self) -> list[str]:
         self.catch_up()
         return [] if self.sim.boot_s > 5.0 else ["global position (GPS)"]
+
+    async def identify(self) -> Identity:
+        return Identity(AutopilotKind.PX4, "1.16.1", "00000000000000000000000000000001")
+
+    async def read_parameters(self, names: Sequence[str]) -> dict[str, float]:
+        self.catch_up()
+        known = {parameter.name: float(parameter.value) for parameter in self.sim.parameters.all()}
+        return {name: known[name] for name in names if name in known}
 
     async def arm(self) -> None:
         self._command("arm", self.sim.arm)

@@ -1,0 +1,15 @@
+"""How the simulated vehicle is set up before it follows lines: PX4's defaults, but for these parameters.
+
+A real vehicle needs the same, and pre-flight checks ask for it: with PX4's defaults a lost stream of setpoints makes a
+vehicle without a pilot's sticks sink where it is.
+"""
+
+from sitl.parameters import DEFAULTS
+
+_WANTED: dict[str, float | int] = {
+    "COM_OBL_RC_ACT": 3,  # setpoints stop: return
+    "COM_RC_OVERRIDE": 3,  # the sticks take over in automatic modes and in offboard
+    "RTL_RETURN_ALT": 30.0,  # above the line, and below a mission's fence
+}
+SETUP = {name: value for name, value in _WANTED.items() if name in DEFAULTS}
+"""Parameter values by name; only such as the model has."""
