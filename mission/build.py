@@ -108,6 +108,6 @@ def build_task(plan: p.AnyTask, guidance: GuidanceSettings, memory: FlightMemory
         case p.Hold():
             return HoldTask(plan.duration_s)
         case p.Return():
-            return GoDownTask(Command.RETURN)
+            return GoDownTask(Command.RETURN, memory)
         case p.Land():
-            return GoDownTask(Command.LAND)
+            return GoDownTask(Command.LAND, memory)

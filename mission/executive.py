@@ -19,6 +19,7 @@ from mission.detours import Detour, detour_task
 from mission.eyes import Eyes
 from mission.hazards import TaskView, find_hazards
 from mission.helm import Helm, UnsafeSetpointError
+from mission.limits import floor_m
 from mission.logbook import Logbook
 from mission.plan import MissionPlan
 from mission.preflight import wait_until_ready
@@ -260,8 +261,15 @@ class Executive:
         self._task = build_task(plan, self._guidance, self._situation.memory)
         self._task_started_ns = self._clock.now_ns()
         self._situation.expect_line(self._task_started_ns)
+        self._set_floor(getattr(plan, "altitude_m", None))
         self._may_be_over_line = self._may_be_over_line or plan.task not in _STAYS_CLEAR
         self._log.record(TaskStarted(self._task_started_ns, index, plan.task))
+
+    def _set_floor(self, goal_m: float | None) -> None:
+        """A task that starts from the ground has none to keep to."""
+        height_m = self._altitude_m()
+        heights_m = [height_m] if goal_m is None else [height_m, goal_m]
+        self._helm.floor_m = floor_m(*heights_m)
 
     async def _end_task(self, result: Result, reason: str) -> None:
         """Close the task in the log; after a completed one go on with the next, or end the flight."""
@@ -288,6 +296,7 @@ class Executive:
         await self._machine.trigger_named("rejoin", towards=resumption.index)
         now_ns = self._clock.now_ns()
         self._may_be_over_line = True
+        self._set_floor(resumption.place.height_m)
         self._task_started_ns = now_ns
         self._task = build_task(self._plan.tasks[resumption.index], self._guidance, self._situation.memory)
         transit_down_m = self._situation.memory.start.down_m - resumption.transit_height_m
@@ -350,7 +359,7 @@ class Executive:
 
     async def _end_early(self, now_ns: int, hazard: Hazard, reaction: Reaction, words: str) -> None:
         """End the mission: give up control, or go down."""
-        reaction = way_down(reaction, may_be_over_line=self._may_be_over_line)
+        wanted, reaction = reaction, way_down(reaction, may_be_over_line=self._may_be_over_line)
         self._log.record(Event(now_ns, hazard, Severity.ERROR, words, reaction))
         self._end = (_RESULTS.get(hazard, Result.FAILED), f"{hazard.replace('_', ' ')}: {words}")
         await self._end_task(*self._end)
@@ -358,7 +367,7 @@ class Executive:
             # Touch nothing more: the pilot, or the autopilot's own failsafe, has the vehicle.
             await self._machine.trigger_named("give_up" if self._end[0] is Result.TAKEN_OVER else "lose")
         else:
-            await self._go_down(hazard, reaction)
+            await self._go_down(hazard, wanted, reaction)
 
     def _note_hazards(self, now_ns: int, hazards: dict[Hazard, str], decision: tuple[Hazard, Reaction] | None) -> None:
         """Log each hazard that is not the one reacted to, once."""
@@ -388,8 +397,8 @@ class Executive:
             failure=self._situation.troubles.task_failure,
         )
 
-    async def _go_down(self, hazard: Hazard, reaction: Reaction) -> None:
-        """End the mission early: hold for a moment, then land or return."""
+    async def _go_down(self, hazard: Hazard, wanted: Reaction, reaction: Reaction) -> None:
+        """End the mission early: hold for a moment, then land or return; `wanted` is the reaction unresolved."""
         await self._machine.trigger_named("go_down")
         self._situation.troubles = Troubles()
         self._detour = None
@@ -400,9 +409,9 @@ class Executive:
         command = Command.LAND if reaction is Reaction.LAND else Command.RETURN
         task = self._task
         is_healthy = hazard not in (Hazard.INTERNAL_ERROR, Hazard.TASK_TIMED_OUT)
-        if isinstance(task, GoDownTask) and is_healthy and task.command in (command, Command.LAND):
+        if isinstance(task, GoDownTask) and is_healthy and (wanted is Reaction.LAND_CLEAR or task.command is command):
             return  # it is on that way already
-        self._task = GoDownTask(command, PAUSE_BEFORE_GOING_DOWN_S)
+        self._task = GoDownTask(command, self._situation.memory, PAUSE_BEFORE_GOING_DOWN_S)
         try:
             await self._helm.hold()
         except AutopilotError as error:  # then the way down is all the more urgent, and goes on

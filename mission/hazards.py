@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 
 from drivers.clock import NS_PER_S
-from mission.autopilot import VehicleState
+from mission.autopilot import LandedState, VehicleState
 from mission.mode_watch import ModeView
 from mission.safety import PRIORITY, Hazard
 
@@ -135,8 +135,9 @@ def find_hazards(seen: SafetyInput, limits: SafetyLimits) -> dict[Hazard, str]:
 
 def _of_modes(seen: SafetyInput) -> dict[Hazard, str]:
     state, modes = seen.state, seen.modes
-    if seen.was_armed and not state.is_armed and not seen.task.is_going_down:
-        return {Hazard.DISARMED: "the vehicle was disarmed in mid-mission"}
+    is_down = seen.task.is_going_down and state.landed is LandedState.ON_GROUND
+    if seen.was_armed and not state.is_armed and not is_down:
+        return {Hazard.DISARMED: "the vehicle was disarmed before it had landed"}
     if state.mode in modes.explained:
         return {}
     if state.is_failsafe:

@@ -5,7 +5,7 @@ from collections.abc import Awaitable
 from drivers.clock import Clock
 from mission.autopilot import Autopilot, AutopilotError, FlightMode, NoAnswerError, Setpoint, VehicleState
 from mission.guidance import leash
-from mission.limits import SetpointLimits, unsafe
+from mission.limits import LOWEST_M, SetpointLimits, unsafe
 from mission.mode_watch import ModeWatch
 from mission.preflight import not_at_rest
 from mission.reporting import FlightLog
@@ -34,6 +34,9 @@ class Helm:
         self._n_missed_setpoints = 0
         self.reference = Setpoint(0.0, 0.0, 0.0, 0.0)
         self.start = self.reference
+        """The take-off point."""
+        self.floor_m = LOWEST_M
+        """What setpoints must stay above, from the take-off point."""
         self.modes = ModeWatch()
         self.targets = TargetWatch()
         self.was_told_to_arm = False
@@ -63,7 +66,7 @@ class Helm:
         """Send a setpoint on its leash; the first of an offboard phase is where the vehicle is."""
         if self.modes.is_offboard:
             wanted = leash(setpoint, state, self._limits.leash_m)
-            words = unsafe(wanted, self.start, self._limits)
+            words = unsafe(wanted, self.start, self.floor_m, self._limits)
             if words is not None:
                 raise UnsafeSetpointError(words)
             self.reference = wanted

@@ -16,11 +16,21 @@ class SetpointLimits:
     leash_m: float
     max_distance_m: float
     max_altitude_m: float
-    min_altitude_m: float = 0.5
 
 
-def unsafe(setpoint: Setpoint, start: Setpoint, limits: SetpointLimits) -> str | None:
-    """Why a setpoint must not be sent, in a sentence; None where it may. `start` is the take-off point."""
+LOWEST_M = 0.5
+"""Below this only the autopilot's own modes go: to land."""
+
+SINK_MARGIN_M = 1.0
+"""A task may sink so far below the height that it began at, or goes to."""
+
+
+def unsafe(setpoint: Setpoint, start: Setpoint, floor_m: float, limits: SetpointLimits) -> str | None:
+    """Why a setpoint must not be sent, in a sentence; None where it may.
+
+    `start` is the take-off point, and `floor_m` the height above it that the task must stay above: below may be the
+    line, whatever a task that goes wrong wants.
+    """
     if not all(map(math.isfinite, (setpoint.north_m, setpoint.east_m, setpoint.down_m, setpoint.yaw_rad))):
         return "a setpoint was not a number"
     distance_m = math.hypot(setpoint.north_m - start.north_m, setpoint.east_m - start.east_m)
@@ -29,6 +39,11 @@ def unsafe(setpoint: Setpoint, start: Setpoint, limits: SetpointLimits) -> str |
     altitude_m = start.down_m - setpoint.down_m
     if altitude_m > limits.max_altitude_m + limits.leash_m:
         return f"a setpoint was {altitude_m:.0f} m high, above the fence"
-    if altitude_m < limits.min_altitude_m:
-        return f"a setpoint was {altitude_m:.1f} m high: only the autopilot's own modes go to the ground"
+    if altitude_m < floor_m:
+        return f"a setpoint was {altitude_m:.1f} m high, but the task has to stay above {floor_m:.1f} m"
     return None
+
+
+def floor_m(*heights_m: float) -> float:
+    """What a task must stay above that begins and ends at these heights above the take-off point [m]."""
+    return max(LOWEST_M, min(heights_m) - SINK_MARGIN_M)

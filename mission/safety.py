@@ -120,6 +120,7 @@ def _reaction(hazard: Hazard, reactions: Mapping[Hazard, Reaction], *, is_offboa
 _MATTERS_ON_THE_WAY_DOWN = (
     Hazard.TAKEOVER,
     Hazard.AUTOPILOT_FAILSAFE,
+    Hazard.DISARMED,
     Hazard.INTERNAL_ERROR,
     Hazard.TASK_TIMED_OUT,
 )
