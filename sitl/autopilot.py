@@ -19,11 +19,12 @@ from sitl.parameters import Parameters
 from sitl.pilot import Pilot, Sticks
 from sitl.place import Home, Origin
 from sitl.positioning import Positioning
+from sitl.preflight import Preflight
 from sitl.takeoff_landing import LandDetector, Ramp, TakeoffRamp
 from sitl.vehicle import Vector, Vehicle, euler_of
 from sitl.wind import Wind
 
-_HOME_S = 1.2  # after boot: the first home
+_HOME_S = 1.14  # after boot: the first home
 _MIN_SATELLITES = 4  # for a fix
 DEFAULT_UID = 5283920058631409231  # that of every PX4 SITL
 _NAVIGATOR_S = 0.04  # from a mode change to what PX4's navigator says about it
@@ -78,9 +79,12 @@ class SimAutopilot:
         self._offboard_target: tuple[Vector, float] | None = None
         self._setpoint_s: float | None = None
         self._has_taken_off = False
+        self._took_off_here = False
         self._takeoff_requests = 0
         self._takeoff_altitude_m: float | None = None
         self._pilot = Pilot(self.parameters)
+        self._stick_mode = self.mode
+        self._preflight = Preflight(self.parameters, self.say)
         self._positioning = Positioning()
         self.last_fix_m: Vector = self.estimate.position_m
 
@@ -106,7 +110,7 @@ class SimAutopilot:
         """The landed state, as EXTENDED_SYS_STATE tells it."""
         if self._land_detector.is_landed:
             return Landed.ON_GROUND
-        if self.mode is Mode.TAKEOFF:
+        if self.mode is Mode.TAKEOFF and self._took_off_here:
             return Landed.TAKEOFF
         if self._task is not None and self._task.is_landing:
             return Landed.LANDING
@@ -219,12 +223,13 @@ class SimAutopilot:
         vehicle, commander = self.vehicle, self.commander
         self._pilot.step(self.boot_s)
         self._positioning.step(self.boot_s, has_gps=self.has_gps)
-        mode = commander.mode
+        self._rest_sticks()
         commander.step(self._observation())
-        if commander.mode is not mode:
-            self._pilot.rest()
+        self._rest_sticks()
         if self._was_armed and not commander.is_armed:
             self._set_home()
+            self._preflight.disarmed(self.boot_s)
+        self._preflight.step(dt_s, self.boot_s, has_gps=self.has_gps, is_armed=commander.is_armed)
         self._was_armed = commander.is_armed
         self._follow_mode()
         self._ramp.step(
@@ -247,8 +252,14 @@ class SimAutopilot:
         if self._positioning.has_gps:
             self.last_fix_m = self.estimate.position_m
         self._detect_landing(dt_s)
-        if self.home is None and self.boot_s >= _HOME_S:
+        if self.home is None and self.boot_s >= _HOME_S and self.has_gps:
             self._set_home()
+
+    def _rest_sticks(self) -> None:
+        """From a change of mode on, a stick counts as moved from where it is then."""
+        if self.mode is not self._stick_mode:
+            self._stick_mode = self.mode
+            self._pilot.rest()
 
     def _control(self, dt_s: float) -> tuple[float, Vector]:
         """Thrust 0 to 1 and torques -1 to 1 of this step."""
@@ -283,6 +294,8 @@ class SimAutopilot:
         # What else decides between the tasks of a mode.
         is_steered = self.mode.needs_sticks and self.sticks is not None
         is_blind = not self.is_position_valid and (self.mode.needs_sticks or self.mode is Mode.LAND)
+        if self.mode is not Mode.TAKEOFF:
+            self._took_off_here = False
         key = (self.mode, takeoff, is_steered, is_blind)
         if key != self._task_key:
             self._task_key = key
@@ -292,6 +305,7 @@ class SimAutopilot:
         if mode is Mode.OFFBOARD and self._offboard_target is not None:
             return Offboard(self.parameters, *self._offboard_target)
         if mode is Mode.TAKEOFF:
+            self._took_off_here = self._land_detector.is_landed or self._took_off_here
             return Takeoff(self.parameters, self.estimate, min(self._takeoff_down_m(), self.estimate.position_m[2]))
         if mode is Mode.RTL and self.home is not None:
             task = Return(self.parameters, self.estimate, self.home.position_m, self.home.yaw_rad)
@@ -321,7 +335,7 @@ class SimAutopilot:
                 return down_m
         height_m = self.parameters.get("MIS_TAKEOFF_ALT")
         self.say(Severity.INFO, f"Using default takeoff altitude: {height_m:.1f} m", delay_s=_NAVIGATOR_S)
-        return self.home.position_m[2] - height_m if self.home else -height_m
+        return self.estimate.position_m[2] - height_m  # from where it is, also in the air
 
     def _wants_takeoff(self) -> bool:
         """Whether the task would leave the ground: a take-off, or an offboard setpoint above."""
@@ -332,11 +346,14 @@ class SimAutopilot:
     def _detect_landing(self, dt_s: float) -> None:
         detector, ramp = self._land_detector, self._ramp.state
         was_landed, was_landing = detector.is_landed, self._was_landing
+        if not self.is_armed:
+            detector.rest()
+            return
         detector.step(
             dt_s,
             is_touching=self.vehicle.is_on_ground,
             is_ramping=ramp is Ramp.RAMPUP,
-            is_flying=ramp is Ramp.FLIGHT or not self.is_armed,
+            is_flying=ramp is Ramp.FLIGHT,
             thrust=self.thrust,
         )
         self._was_landing = isinstance(self._task, Return) and self._task.is_landing
@@ -369,6 +386,8 @@ class SimAutopilot:
         )
 
     def _set_home(self) -> None:
+        if not self.has_gps:
+            return
         yaw_rad = euler_of(self.estimate.quaternion)[2]
         self.home = Home(self.estimate.position_m, yaw_rad, self.boot_s)
 

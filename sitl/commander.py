@@ -38,15 +38,15 @@ class Commander:
 
     @property
     def is_armable(self) -> bool:
-        """PX4's arming checks; on the ground a mode that cannot take off fails them too."""
+        """PX4's arming checks; a mode that cannot be flown, or not be taken off in, fails them too."""
         seen = self._seen
-        if not seen.is_position_valid or seen.battery < self._parameters.get("BAT_CRIT_THR"):
+        if not seen.is_position_valid or self._failsafes.told_warning >= BatteryWarning.CRITICAL:
             return False
-        if self.intended is Mode.OFFBOARD:
+        if self.mode is Mode.OFFBOARD:
             return self.is_offboard_available
-        if self.intended.needs_sticks:
-            return self.is_armed or seen.has_sticks
-        return self.is_armed or self.intended in (Mode.LOITER, Mode.TAKEOFF)
+        if self.mode.needs_sticks:
+            return seen.has_sticks
+        return self.is_armed or self.mode in (Mode.LOITER, Mode.TAKEOFF)
 
     @property
     def warning(self) -> BatteryWarning:

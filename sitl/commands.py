@@ -9,6 +9,7 @@ RETURN_TO_LAUNCH = 20
 LAND = 21
 TAKEOFF = 22
 DO_SET_MODE = 176
+SET_ACTUATOR = 187
 REBOOT = 246
 MISSION_START = 300
 ARM_DISARM = 400
@@ -34,6 +35,8 @@ def execute(autopilot: SimAutopilot, command: int, params: tuple[float, ...]) ->
         return Answer.ACCEPTED  # the model's checks run all the time
     if command == DO_SET_MODE:
         return _set_mode(autopilot, params)
+    if command == SET_ACTUATOR:
+        return Answer.ACCEPTED  # nothing is connected
     if command == INJECT_FAILURE:
         return _inject_failure(autopilot, params)
     if command == MISSION_START:

@@ -13,7 +13,7 @@ from sitl.parameters import Parameters
 
 Say = Callable[[Severity, str], None]
 
-_TEXT_GAP_S = 2.0  # PX4's health report is told at most this often
+_TEXT_GAP_S = 2.1  # PX4's health report, and with it the arming checks, follow at most this often
 _FENCE_ACTIONS = {2: Mode.LOITER, 3: Mode.RTL, 5: Mode.LAND}  # GF_ACTION; 4, terminate, is not modelled
 _STICKS_ACTIONS = {1: Mode.LOITER, 2: Mode.RTL}  # NAV_RCL_ACT; all else lands
 _OFFBOARD_ACTIONS = {3: Mode.RTL, 4: Mode.LAND, 5: Mode.LOITER}  # COM_OBL_RC_ACT; the others need sticks
@@ -75,7 +75,7 @@ class Failsafes:
         self._parameters = parameters
         self._say = say
         self.warning = BatteryWarning.NONE
-        self._told = BatteryWarning.NONE
+        self.told_warning = BatteryWarning.NONE
         self._told_s = -_TEXT_GAP_S
         self._battery_mode: Mode | None = None
         self._fence_mode: Mode | None = None
@@ -197,8 +197,8 @@ class Failsafes:
         self._tell_battery(seen)
 
     def _tell_battery(self, seen: Observation) -> None:
-        if self._told < self.warning and seen.boot_s - self._told_s >= _TEXT_GAP_S:
-            self._told, self._told_s = self.warning, seen.boot_s
+        if self.told_warning < self.warning and seen.boot_s - self._told_s >= _TEXT_GAP_S:
+            self.told_warning, self._told_s = self.warning, seen.boot_s
             words = {1: "Low battery", 2: "Critical battery", 3: "Emergency battery level"}
             self._say(Severity.EMERGENCY, words[self.warning])
 

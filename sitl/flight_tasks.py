@@ -11,6 +11,7 @@ _REFERENCE_GAIN_1_S = 2.0
 _ARRIVAL_GAIN_1_S = 0.6
 _MAX_LAG_M = 2.0  # MPC_XY_ERR_MAX: the reference waits for a vehicle that falls further behind
 _APPROACH_M_S2 = 0.45  # how hard a climb or a descent brakes before its end, as recorded from PX4 v1.16
+_ARRIVED_M = 2.0  # from home, where a return begins to land, as recorded from PX4 v1.16
 _DESCEND_M_S = 0.6  # a failsafe descent without sticks, as recorded from PX4 v1.16
 _TAKEOFF_ACCELERATION_M_S2 = 0.5
 _YAW_RATE_RAD_S = math.radians(45.0)  # a turn that a task makes by itself
@@ -227,7 +228,7 @@ class Return(AutoTask):
         climb_m = self.return_height_m - (self._home_m[2] - d)
         radius_m = self._parameters.get("NAV_MC_ALT_RAD")
         self._has_climbed = self._has_climbed or climb_m < radius_m
-        if self._has_climbed and distance_m < 1.0 and math.hypot(*estimate.velocity_m_s[:2]) < 1.0:
+        if self._has_climbed and distance_m < _ARRIVED_M:
             self._landing = Land(self._parameters, estimate, self._home_m[:2], self._home_yaw_rad)
             return self._landing.step(dt_s, estimate, height_m)
         if distance_m < self._parameters.get("RTL_MIN_DIST"):

@@ -20,10 +20,14 @@ from sitl.telemetry import STREAMS, Stream
 _FIRST_BEAT_S = 0.24  # after boot; the heartbeat keeps this fraction of each second
 _COMMAND_S = 0.008  # a command waits this long for PX4's commander, in flight time
 _TEXT_CHUNK = 50
+_KEPT_TEXTS = 8
+_FIRST_TEXT_S = 2.5  # after boot
+_HEARTBEAT_LOSS_S = 2.5
 _PARAMETERS_PER_SERVICE = 4
 _SYSTEM, _COMPONENT = 1, 1
 _GET_MESSAGE_INTERVAL, _SET_MESSAGE_INTERVAL, _REQUEST_MESSAGE = 510, 511, 512
 _REQUEST_CAPABILITIES = 520
+_ABOUT_MESSAGES = (_GET_MESSAGE_INTERVAL, _SET_MESSAGE_INTERVAL, _REQUEST_MESSAGE, _REQUEST_CAPABILITIES)
 _AUTOPILOT_VERSION = 148
 _FLOAT, _INT32 = 9, 6  # MAV_PARAM_TYPE
 _IGNORE_POSITION, _IGNORE_YAW = 0x7, 0x400  # POSITION_TARGET_TYPEMASK
@@ -47,19 +51,22 @@ class _NoComponentMetadata(dialect.MAVLink_message):  # type: ignore[misc]
 class MavlinkFace:
     """One autopilot's end of a MAVLink link: bytes in by `receive`, bytes out by `service`."""
 
-    def __init__(self, autopilot: SimAutopilot) -> None:
-        """Speak for `autopilot`."""
+    def __init__(self, autopilot: SimAutopilot, *, first_beat_s: float = _FIRST_BEAT_S) -> None:
+        """Speak for `autopilot`, whose streams begin `first_beat_s` [s] after now."""
         self._autopilot = autopilot
         self._outbox: list[bytes] = []
         self._mavlink: Any = dialect.MAVLink(None, srcSystem=_SYSTEM, srcComponent=_COMPONENT)
         self._streams = {stream.message_id: stream for stream in STREAMS}
-        first_s = autopilot.boot_s + _FIRST_BEAT_S
+        first_s = autopilot.boot_s + first_beat_s
         self._due_s = {stream.message_id: first_s for stream in STREAMS if stream.rate_hz > 0}
         self._intervals_s = {stream.message_id: 1 / stream.rate_hz for stream in STREAMS if stream.rate_hz > 0}
         self._commands: deque[tuple[float, Any, int, tuple[float, ...]]] = deque()
         self._parameters: deque[Parameter] = deque()
         self._has_refused_frame = False
         self._n_texts = 0
+        # PX4 keeps its texts while no ground station is there to read them; a full queue loses the oldest.
+        self._texts: deque[tuple[Severity, str]] = deque(maxlen=_KEPT_TEXTS)
+        self._heard_s = -math.inf
         self._n_pings = 0
         self._ping_s = autopilot.boot_s
 
@@ -76,8 +83,10 @@ class MavlinkFace:
         while self._commands and self._commands[0][0] <= now_s:
             _, message, command, params = self._commands.popleft()
             self._acknowledge(message, command, self._execute(command, params))
-        for severity, text in self._autopilot.drain_texts():
-            self._send_text(severity, text)
+        self._texts.extend(self._autopilot.drain_texts())
+        if self._is_heard(now_s):
+            while self._texts:
+                self._send_text(*self._texts.popleft())
         for _ in range(min(_PARAMETERS_PER_SERVICE, len(self._parameters))):
             self._send_parameter(self._parameters.popleft())
         for message_id, due_s in self._due_s.items():
@@ -115,6 +124,10 @@ class MavlinkFace:
         if message.command == commands.DO_SET_MODE:
             # PX4's MAVLink module answers at once, its commander again with what came of it.
             self._acknowledge(message, message.command, Answer.ACCEPTED)
+        elif message.command in _ABOUT_MESSAGES:
+            # These are the module's own, and never wait for the commander.
+            self._acknowledge(message, message.command, self._execute(message.command, params))
+            return
         self._commands.append((self._autopilot.boot_s + _COMMAND_S, message, message.command, params))
 
     def _on_set_position_target_local_ned(self, message: Any) -> None:
@@ -150,12 +163,24 @@ class MavlinkFace:
         if message.param_type == _INT32:
             value = struct.unpack("<i", struct.pack("<f", message.param_value))[0]
         try:
+            before = self._autopilot.parameters.parameter(message.param_id)
             self._autopilot.set_parameter(message.param_id, value)
         except (KeyError, TypeError):
             return
         except ValueError as error:
             self._autopilot.say(Severity.WARNING, f"Refused: {error}")  # and the old value is the answer
-        self._send_parameter(self._autopilot.parameters.parameter(message.param_id))
+        parameter = self._autopilot.parameters.parameter(message.param_id)
+        self._send_parameter(parameter)
+        if parameter != before:
+            self._parameters.append(parameter)  # PX4 answers, and then tells every station of the change
+
+    def _is_heard(self, now_s: float) -> bool:
+        """Whether a ground station's heartbeat came of late."""
+        return now_s >= _FIRST_TEXT_S and now_s - self._heard_s < _HEARTBEAT_LOSS_S
+
+    def _on_heartbeat(self, message: Any) -> None:
+        if message.type == dialect.MAV_TYPE_GCS:
+            self._heard_s = self._autopilot.boot_s
 
     def _on_ping(self, message: Any) -> None:
         if message.target_system == 0:
@@ -171,7 +196,7 @@ class MavlinkFace:
     def _execute(self, command: int, params: tuple[float, ...]) -> Answer:
         if command == _REQUEST_CAPABILITIES:
             return self._request_message(_AUTOPILOT_VERSION)
-        if command in (_SET_MESSAGE_INTERVAL, _GET_MESSAGE_INTERVAL, _REQUEST_MESSAGE):
+        if command in _ABOUT_MESSAGES:
             message_id = round(params[0]) if math.isfinite(params[0]) else -1
             if command == _SET_MESSAGE_INTERVAL:
                 return self._set_interval(message_id, params[1])
@@ -221,7 +246,8 @@ class MavlinkFace:
 
     def _send_text(self, severity: int, text: str) -> None:
         """Send a text as PX4 does: a tab says that it also exists as an event, and 50 characters make a chunk."""
-        data = f"{text}\t".encode("ascii", "replace")
+        end = "" if text.startswith("Preflight") else "\t"
+        data = f"{text}{end}".encode("ascii", "replace")
         for chunk, start in enumerate(range(0, len(data), _TEXT_CHUNK)):
             piece = data[start : start + _TEXT_CHUNK]
             self._send(self._mavlink.statustext_encode(int(severity), piece, self._n_texts % 65536, chunk))

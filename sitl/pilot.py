@@ -6,6 +6,8 @@ from dataclasses import dataclass
 from sitl.control import clamp
 from sitl.parameters import Parameters
 
+_NOTICE_S = 0.15  # until PX4 acts on sticks that are gone, as recorded
+
 
 @dataclass(frozen=True, slots=True)
 class Sticks:
@@ -67,6 +69,6 @@ class Pilot:
 
     def step(self, boot_s: float) -> None:
         """Sticks that have not come for COM_RC_LOSS_T [s] are none."""
-        if self.sticks is not None and boot_s - self._last_s > self._parameters.get("COM_RC_LOSS_T"):
+        if self.sticks is not None and boot_s - self._last_s > self._parameters.get("COM_RC_LOSS_T") + _NOTICE_S:
             self.sticks = None
             self.is_moving = False

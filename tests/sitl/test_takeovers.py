@@ -123,7 +123,7 @@ def test_lost_sticks_hold_then_return() -> None:
     flight.sticks = None
     lost_s = flight.autopilot.boot_s
     flight.run(2.0)
-    assert flight.heard("Failsafe activated: entering Hold for 5 seconds") - lost_s == pytest.approx(0.5, abs=0.06)
+    assert flight.heard("Failsafe activated: entering Hold for 5 seconds") - lost_s == pytest.approx(0.65, abs=0.06)
     assert (flight.autopilot.mode, flight.autopilot.failsafe) == (Mode.LOITER, Failsafe.STICKS_LOSS)
     flight.run(5.0)
     assert flight.autopilot.mode is Mode.RTL
