@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from drivers.camera.camera import Intrinsics
 from mission import plan as p
+from mission.geofence import Fence
 from mission.guidance import GuidanceSettings
 from mission.safety import Hazard, Reaction, SafetyLimits
 from mission.tasks.align import AlignTask
@@ -51,6 +52,11 @@ def safety_limits(plan: p.SafetyPlan) -> SafetyLimits:
         battery_low=plan.battery_low_percent / 100,
         battery_critical=plan.battery_critical_percent / 100,
     )
+
+
+def fence(plan: p.SafetyPlan) -> Fence:
+    """The fence around the flight."""
+    return Fence(plan.max_distance_m, plan.max_altitude_m, plan.fence.corners_ne_m, plan.fence.min_altitude_m)
 
 
 def reactions(plan: p.SafetyPlan) -> Mapping[Hazard, Reaction]:
