@@ -168,9 +168,22 @@ def sitl(
 
 
 @app.command()
-def check(mission: MissionArgument) -> None:
+def check(
+    mission: MissionArgument,
+    diagram: Annotated[
+        bool, typer.Option("--diagram", help="Print the flight's state machine instead (Mermaid).")
+    ] = False,
+) -> None:
     """Validate a mission file, explain it, and estimate its flight."""
     mission_file = _read_mission(mission)
+    if diagram:
+        from mission.machine import FlightMachine
+        from mission.machine_drawing import mermaid
+
+        typer.echo(
+            mermaid(FlightMachine([task.task for task in mission_file.plan.tasks], lambda state: None)), nl=False
+        )
+        return
     from rich.console import Console
 
     from mission.estimate import total

@@ -11,6 +11,7 @@ from mission.build import reactions
 from mission.plan import ParameterCheck, SafetyPlan
 from mission.preflight_checks import check_all
 from mission.safety import FIXED_REACTIONS, PRIORITY, Reaction
+from tests.docs.state_machine_page import PAGE, page
 from tests.mission.test_preflight_checks import FINE, PLAN
 
 ROOT = Path(__file__).parents[2]
@@ -43,3 +44,7 @@ def test_the_preflight_page_names_every_check() -> None:
     unread = [check.name for check in check_all(replace(FINE, parameters=None), PLAN)]
     place = unread.index("parameters") + 1
     assert names == [*unread[:place], *get_args(ParameterCheck), *unread[place:]]
+
+
+def test_the_state_machine_is_drawn_from_the_code() -> None:
+    assert PAGE.read_text(encoding="utf-8") == page(), "run make diagram"
