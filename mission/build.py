@@ -6,6 +6,7 @@ from dataclasses import replace
 
 from drivers.camera.camera import Intrinsics
 from mission import plan as p
+from mission.geofence import Fence
 from mission.guidance import GuidanceSettings
 from mission.hazards import SafetyLimits
 from mission.limits import SetpointLimits
@@ -68,6 +69,11 @@ def search_settings(plan: p.SafetyPlan) -> SearchSettings:
     """How a lost line is searched for, in the program's units."""
     search = plan.line_search
     return SearchSettings(search.climb_m, math.radians(search.sweep_deg), search.back_m, search.n_detections)
+
+
+def fence(plan: p.SafetyPlan) -> Fence:
+    """The fence around the flight."""
+    return Fence(plan.max_distance_m, plan.max_altitude_m, plan.fence.corners_ne_m, plan.fence.min_altitude_m)
 
 
 def reactions(plan: p.SafetyPlan) -> Mapping[Hazard, Reaction]:

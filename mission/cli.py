@@ -1,8 +1,9 @@
 """The command line: the composition root. Heavy rooms are imported by the command that needs them.
 
-Exit codes: 0 done · 1 something could not be read or written · 2 bad input, nothing was connected · 3 not ready, the
-vehicle was never armed · 4 the mission ended early · 5 the pilot, or the autopilot's failsafe,
-has the vehicle · 70 a fault of lineflight's own · 130 stopped by the operator.
+Exit codes: 0 done · 1 a log could not be written, or some of the images not read · 2 bad input (a mission, world,
+camera, log or option that cannot be used), nothing was connected · 3 not ready, the vehicle was never armed · 4 the
+mission ended early · 5 the pilot, or the autopilot's failsafe, has the vehicle · 70 a fault of lineflight's own ·
+130 stopped by the operator.
 """
 
 import asyncio
@@ -219,15 +220,33 @@ def sitl(
 
 
 @app.command()
-def check(mission: MissionArgument) -> None:
+def check(
+    mission: MissionArgument,
+    diagram: Annotated[
+        bool, typer.Option("--diagram", help="Print the flight's state machine instead (Mermaid).")
+    ] = False,
+) -> None:
     """Validate a mission file, explain it, and estimate its flight."""
     mission_file = _read_mission(mission)
+    if diagram:
+        from mission.machine import FlightMachine
+        from mission.machine_drawing import mermaid
+
+        typer.echo(
+            mermaid(FlightMachine([task.task for task in mission_file.plan.tasks], lambda state: None)), nl=False
+        )
+        return
     from rich.console import Console
 
-    from mission.estimate import estimate_mission
+    from mission.estimate import total
     from mission.explain import print_plan
+    from mission.offline_checks import check_offline
 
-    print_plan(mission_file.plan, estimate_mission(mission_file.plan), Console())
+    plan = mission_file.plan
+    checks = check_offline(plan)
+    print_plan(plan, total(plan), checks, Console())
+    if any(check.is_final for check in checks):
+        _fail(f"{mission}: this mission is refused; see what failed above", EXIT_BAD_INPUT)
 
 
 @app.command()

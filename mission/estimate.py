@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 
 from mission import plan as p
-from mission.reach import reaches_m
+from mission.reach import reckon
 
 _TURN_SETTLE_S = 2.0
 _ARRIVE_S = 3.0
@@ -48,7 +48,7 @@ def total(plan: p.MissionPlan) -> FlightTotals:
         duration_s=duration_s,
         distance_m=sum(estimate.distance_m for estimate in estimates),
         energy_wh=duration_s / 3600 * plan.vehicle.hover_power_w,
-        reach_m=max(reaches_m(plan)),
+        reach_m=max(leg.reach_m for leg in reckon(plan)),
         highest_m=max(estimate.altitude_m for estimate in estimates),
     )
 

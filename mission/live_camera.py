@@ -6,12 +6,11 @@ from types import TracebackType
 from typing import Self
 
 from drivers.camera.camera import Camera, CameraError, CameraSettings, Intrinsics
-from drivers.camera.spec import open_camera, parse_spec
+from drivers.camera.spec import open_camera
 from drivers.clock import ScaledClock
 from mission.autopilot import VehicleState
+from mission.camera_plan import SIM_PREFIX, check_source
 from mission.plan import CameraPlan
-
-SIM_PREFIX = "sim:"
 
 
 class LiveCamera:
@@ -29,7 +28,7 @@ class LiveCamera:
         if source.startswith(SIM_PREFIX):
             self._hang_on_telemetry(source.removeprefix(SIM_PREFIX), camera, plan.rate_hz)
         else:
-            parse_spec(source)  # a misspelt one is told now, not by the worker in the middle of getting ready
+            check_source(source)  # a misspelt one is told now, not by the worker in the middle of getting ready
             settings = camera_settings(plan)
             self.open_camera = functools.partial(open_camera, source, settings, self.clock)
 

@@ -6,20 +6,13 @@ the program that keeps degrees). Names r, epsilon, P and theta_0 are [Ceron]'s, 
 
 from typing import Annotated, Literal, Self, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, Field, model_validator
 from pydantic_core import PydanticCustomError
 
+from mission.plan_fence import FencePlan
 from mission.plan_rules import DEFAULT_TAKEOFF_M
-
-Metres = Annotated[float, Field(gt=0, le=1000)]
-AltitudeM = Annotated[float, Field(ge=1, le=120)]
-TimeLimitS = Annotated[float, Field(gt=0, le=3600)]
-
-
-class _Section(BaseModel):
-    """Strict: a number in quotes or a misspelt key is an error, never a silent default."""
-
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, allow_inf_nan=False)
+from mission.plan_section import AltitudeM, Metres, TimeLimitS
+from mission.plan_section import Section as _Section
 
 
 class Takeoff(_Section):
@@ -270,6 +263,7 @@ class SafetyPlan(_Section):
 
     max_distance_m: float = Field(150.0, gt=0, le=2000, description="Radius of the fence around the take-off point.")
     max_altitude_m: AltitudeM = Field(60.0, description="Height of the fence above the take-off point.")
+    fence: FencePlan = FencePlan()
     line_height_m: float | None = Field(
         None, gt=0, le=110, description="Top of the line, wires and poles, above the take-off point; else not checked."
     )

@@ -12,7 +12,8 @@ from pydantic_core import ErrorDetails
 from drivers.camera.camera import CameraError, Intrinsics
 from mission.camera_plan import planned_camera
 from mission.plan import TASK_MODELS, MissionPlan, SafetyPlan
-from mission.plan_rules import check_rules
+from mission.plan_checks import check_plan
+from mission.plan_rules import RuleBreak, check_rules
 from mission.yaml_document import Document, DocumentError, Location, Problem, key_path, parse_document
 
 MAX_BYTES = 256 * 1024
@@ -72,6 +73,7 @@ def read_mission(path: Path) -> MissionFile:
     except ValidationError as error:
         found = [_problem(details, document) for details in error.errors()]
         raise MissionFileError(path, _merge_alternatives(found) + problems) from None
+    problems = problems or [_rule_problem(broken, document) for broken in check_plan(plan)]
     if problems:
         raise MissionFileError(path, problems)
     try:
@@ -118,13 +120,13 @@ def _rule_problems(data: dict[object, object], document: Document) -> list[Probl
     if fence_m is None:
         fence_m = SafetyPlan.model_fields["max_altitude_m"].default
     return [
-        Problem(
-            document.line(broken.location),
-            key_path(broken.location),
-            f"found {broken.found}; allowed: {broken.allowed}",
-        )
-        for broken in check_rules(tasks if isinstance(tasks, list) else [], fence_m)
+        _rule_problem(broken, document) for broken in check_rules(tasks if isinstance(tasks, list) else [], fence_m)
     ]
+
+
+def _rule_problem(broken: RuleBreak, document: Document) -> Problem:
+    words = f"found {broken.found}; allowed: {broken.allowed}"
+    return Problem(document.line(broken.location), key_path(broken.location), words)
 
 
 def _problem(details: ErrorDetails, document: Document) -> Problem:

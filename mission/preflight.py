@@ -109,7 +109,7 @@ async def wait_until_ready(
         while True:
             frames.add(eyes.take())
             checks = check_all(_facts(autopilot, eyes, answers, frames, free_bytes(), may_fly=may_fly), plan)
-            tell(tuple(check.waits_for for check in checks if check.waits_for))
+            tell(tuple(dict.fromkeys(check.waits_for for check in checks if check.waits_for)))
             now_s = loop.time()
             has_failed = any(check.result is CheckResult.FAILED for check in checks)
             is_final = any(check.is_final for check in checks)

@@ -7,6 +7,7 @@ from datetime import UTC, datetime
 from mission.autopilot import AutopilotKind, FlightMode, Identity, LandedState, VehicleState
 from mission.checks import Check, failed, passed, waiting, warning
 from mission.estimate import FlightTotals, total
+from mission.offline_checks import check_offline
 from mission.parameter_checks import Extent, check_parameters
 from mission.plan import MissionPlan
 
@@ -64,7 +65,7 @@ def check_all(facts: Facts, plan: MissionPlan) -> list[Check]:
         ]
     return [
         *vehicle,
-        _fence(plan, totals),
+        *check_offline(plan),
         _camera(facts),
         _vision(facts),
         _disk(facts.free_bytes, plan, totals),
@@ -150,12 +151,6 @@ def _battery(state: VehicleState | None, plan: MissionPlan, totals: FlightTotals
     reserve = plan.safety.battery_low_percent / 100
     needed = reserve + totals.energy_wh / plan.vehicle.battery_wh
     words = f"{state.battery:.0%} of {plan.vehicle.battery_wh:g} Wh"
-    if needed > 1:
-        return failed(
-            "battery",
-            f"the flight needs {totals.energy_wh:.0f} Wh and {reserve:.0%} of reserve, more than a full battery of "
-            f"{plan.vehicle.battery_wh:g} Wh holds; shorten the mission",
-        )
     if state.battery < needed:
         return failed(
             "battery", f"{words}, but the flight and {reserve:.0%} of reserve need {needed:.0%}; change the battery"
@@ -169,14 +164,6 @@ def _parameters(facts: Facts, plan: MissionPlan, totals: FlightTotals) -> list[C
     if facts.parameters is None:
         return [waiting("parameters", "the autopilot's parameters")]
     return check_parameters(facts.parameters, plan, Extent(totals.reach_m, totals.highest_m))
-
-
-def _fence(plan: MissionPlan, totals: FlightTotals) -> Check:
-    fence_m = plan.safety.max_distance_m
-    words = f"the mission goes about {totals.reach_m:.0f} m far at most, the fence is {fence_m:g} m wide"
-    if totals.reach_m > fence_m:
-        return warning("fence", f"{words}: it may end there; widen safety.max_distance_m, or shorten the mission")
-    return passed("fence", words)
 
 
 def _camera(facts: Facts) -> Check:

@@ -1,13 +1,18 @@
 """The documents: no dead link, and tables that are the code's."""
 
 import re
+from dataclasses import replace
 from pathlib import Path
+from typing import get_args
 
 import pytest
 
 from mission.build import reactions
-from mission.plan import SafetyPlan
+from mission.plan import ParameterCheck, SafetyPlan
+from mission.preflight_checks import check_all
 from mission.safety import FIXED_REACTIONS, PRIORITY, Reaction
+from tests.docs.state_machine_page import PAGE, page
+from tests.mission.test_preflight_checks import FINE, PLAN
 
 ROOT = Path(__file__).parents[2]
 DOCUMENTS = sorted([*ROOT.glob("*.md"), *ROOT.glob("docs/**/*.md")])
@@ -32,3 +37,14 @@ def test_the_readme_shows_the_shipped_mission() -> None:
     shown = re.findall(r"^  - (\{task:[^}]+\})", readme, re.M)
     shipped = re.findall(r"^  - (\{task:[^}]+\})", (ROOT / "missions/follow_line.yaml").read_text(), re.M)
     assert shown == shipped
+
+
+def test_the_preflight_page_names_every_check() -> None:
+    names = re.findall(r"^\| `(\w+)` \|", (ROOT / "docs/preflight.md").read_text(), re.M)
+    unread = [check.name for check in check_all(replace(FINE, parameters=None), PLAN)]
+    place = unread.index("parameters") + 1
+    assert names == [*unread[:place], *get_args(ParameterCheck), *unread[place:]]
+
+
+def test_the_state_machine_is_drawn_from_the_code() -> None:
+    assert PAGE.read_text(encoding="utf-8") == page(), "run make diagram"

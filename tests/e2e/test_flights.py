@@ -42,6 +42,8 @@ def test_dry_run_follows_the_line_and_comes_home(tmp_path: Path) -> None:
     assert report["setpoints"]["rate_hz"] == pytest.approx(20.0, rel=0.1)
     assert report["vision"]["estimates"] > 100
     assert report["events"] == []
+    assert report["preflight"]["n_checks"] >= 18
+    assert report["preflight"]["warnings"] == report["preflight"]["failures"] == []
     assert Path(report["picture"]).stat().st_size > 100_000
 
     inspected = lineflight("inspect", report["log"], "--json")

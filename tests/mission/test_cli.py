@@ -61,8 +61,21 @@ def test_bad_missions_exit_2_before_anything_connects(tmp_path: Path, name: str,
 def test_check_explains_each_task() -> None:
     ran = lineflight("check", MISSION)
     assert_plain(ran, 0)
-    for words in ("follow_line", "climb to 16 m", "follow the line for 30 m", "land here and disarm", "fence 150 m"):
+    for words in (
+        "follow_line", "climb to 16 m", "follow the line for 30 m", "land here and disarm", "fence 150 m",
+        "camera v4l2:/dev/video0, 640 x 480 px at 30 Hz, lens 80° wide", "ok energy: about", "ok time limits: ",
+        "ok line height: at least 5.7 m over the line of 10.3 m", "ok fence: ",
+    ):  # fmt: skip
         assert words in " ".join(ran.out.split())
+
+
+def test_check_refuses_a_mission_beyond_the_battery(tmp_path: Path) -> None:
+    file = tmp_path / "far.yaml"
+    file.write_text(MISSION.read_text() + "vehicle: {battery_wh: 5}\n")
+    ran = lineflight("check", file)
+    assert_plain(ran, 2)
+    assert "failed  energy: " in ran.out
+    assert "refused" in ran.err
 
 
 @pytest.mark.parametrize(

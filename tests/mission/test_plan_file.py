@@ -128,6 +128,53 @@ def test_what_is_no_mission_is_refused(tmp_path: Path, content: bytes, expected:
     assert expected in "\n".join(problems_of(tmp_path, content))
 
 
+LINE = """version: 1
+name: line
+tasks:
+  - {task: takeoff, altitude_m: 5}
+  - {task: ascend, altitude_m: 14}
+  - {task: move_until}
+  - {task: return}
+safety:
+  line_height_m: 10
+"""
+
+
+@pytest.mark.parametrize(
+    ("edit", "expected"),
+    [
+        (("altitude_m: 14", "altitude_m: 12"), "6: tasks[2]: found move_until at 12 m, where the line may be below"),
+        (("{task: return}", "{task: land}"), "7: tasks[3]: found land at 0 m, where the line may be below; allowed: "),
+        (("line_height_m: 10", "line_height_m: 12"), "line_height_m + min_clearance_m = 15 m"),
+        (("safety:", "camera: {source: 'foo:bar'}\nsafety:"), "8: camera.source: found foo:bar; allowed: v4l2:DEVICE"),
+        (("line_height_m: 10", "fence: {polygon_m: [[1, 1], [1, 2], [2, 2]]}"), "9: safety.fence: "),
+        (("line_height_m: 10", "fence: {polygon_m: [[1, 1], [1, 2]]}"), "9: safety.fence.polygon_m: "),
+        (("line_height_m: 10", "fence: {polygon_m: [[1, 1], [1, 2], [2]]}"), "9: safety.fence.polygon_m[2]: "),
+    ],
+)
+def test_line_fence_and_camera_are_checked(tmp_path: Path, edit: tuple[str, str], expected: str) -> None:
+    (tmp_path / "good.yaml").write_text(LINE)
+    read_mission(tmp_path / "good.yaml")
+    text = LINE.replace(*edit)
+    assert text != LINE
+    assert expected in "\n".join(problems_of(tmp_path, text))
+
+
+def test_nothing_sinks_below_the_fences_least_height(tmp_path: Path) -> None:
+    up_and_down = "  - {task: ascend, altitude_m: 9}\n  - {task: descend, altitude_m: 6}\n  - {task: land}"
+    text = GOOD.replace("  - {task: land}", up_and_down) + "safety: {fence: {min_altitude_m: 7}}\n"
+    assert problems_of(tmp_path, text) == [
+        "6: tasks[2].altitude_m: found 6 m; allowed: at least safety.fence.min_altitude_m = 7 m"
+    ]
+
+
+def test_a_calibration_may_lie_in_the_home(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("HOME", str(tmp_path / "home"))
+    found = problems_of(tmp_path, GOOD + "camera: {calibration: ~/none.yaml}\n")
+    assert str(tmp_path / "home" / "none.yaml") in found[0]
+    assert "no home" in problems_of(tmp_path, GOOD + "camera: {calibration: ~nobody-here/none.yaml}\n")[0]
+
+
 def test_a_folder_and_a_missing_file_are_refused(tmp_path: Path) -> None:
     with pytest.raises(MissionFileError, match="this is a folder"):
         read_mission(tmp_path)

@@ -9,8 +9,8 @@ import pytest
 from mission.autopilot import AutopilotError, AutopilotKind, FlightMode, Identity, LandedState, VehicleState
 from mission.camera_plan import pinhole_intrinsics
 from mission.checks import Check
-from mission.estimate import total
-from mission.plan import SafetyPlan, VehiclePlan
+from mission.offline_checks import check_offline
+from mission.plan import VehiclePlan
 from mission.preflight import wait_until_ready
 from mission.preflight_checks import Facts, check_all
 from mission.records import CheckResult
@@ -25,6 +25,7 @@ PLAN = shipped("follow_line")
 AT_REST = VehicleState(
     0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, FlightMode.HOLD, False, LandedState.ON_GROUND, 0.98, True
 )
+OFFLINE = {check.name for check in check_offline(PLAN)}
 PX4 = Identity(AutopilotKind.PX4, "1.16.1", "1f")
 FINE = Facts(
     is_linked=True,
@@ -103,31 +104,16 @@ def test_each_case(name: str, changes: dict[str, object], result: CheckResult, w
 
 def test_every_check_is_in_the_table_or_in_that_of_the_parameters() -> None:
     ours = {check.name for check in check_all(replace(FINE, parameters=None), PLAN)}
-    assert ours == {name for name, *_ in TABLE if name != "offboard_loss_action"} | {"fence"}
+    assert ours == {name for name, *_ in TABLE if name != "offboard_loss_action"} | OFFLINE
 
 
 def test_without_a_link_nothing_is_said_of_the_vehicle() -> None:
-    assert set(checks_of({"is_linked": False})) == {"link", "fence", "camera", "vision", "disk", "clock"}
+    assert set(checks_of({"is_linked": False})) == {"link", "camera", "vision", "disk", "clock"} | OFFLINE
 
 
 def test_the_parameters_of_other_autopilots_are_not_checked() -> None:
     names = set(checks_of({"identity": Identity(AutopilotKind.ARDUPILOT, "", ""), "parameters": None}))
     assert not names & {"parameters", "offboard_loss_action", "return_altitude"}
-
-
-def test_a_fence_narrower_than_the_mission_warns() -> None:
-    reach_m = total(PLAN).reach_m
-    for fence_m, result in ((reach_m - 1, WARNING), (reach_m + 1, OK)):
-        plan = PLAN.model_copy(update={"safety": SafetyPlan(max_distance_m=fence_m)})
-        assert {check.name: check.result for check in check_all(FINE, plan)}["fence"] is result
-
-
-def test_a_mission_beyond_a_full_battery_is_refused() -> None:
-    plan = PLAN.model_copy(update={"vehicle": VehiclePlan(battery_wh=10.0)})
-    full = replace(FINE, state=replace(AT_REST, battery=1.0))
-    battery = next(check for check in check_all(full, plan) if check.name == "battery")
-    assert battery.is_final
-    assert "shorten the mission" in battery.reason
 
 
 # -- waiting -----------------------------------------------------------------------------------------------------------
