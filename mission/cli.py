@@ -232,9 +232,7 @@ def check(
         from mission.machine import FlightMachine
         from mission.machine_drawing import mermaid
 
-        typer.echo(
-            mermaid(FlightMachine([task.task for task in mission_file.plan.tasks], lambda state: None)), nl=False
-        )
+        typer.echo(mermaid(FlightMachine([task.task for task in mission_file.plan.tasks])), nl=False)
         return
     from rich.console import Console
 

@@ -39,7 +39,12 @@ class FlightMachine:
 
     state: str
 
-    def __init__(self, task_names: Sequence[str], before: BeforeChange, after: Callable[[str], None]) -> None:
+    def __init__(
+        self,
+        task_names: Sequence[str],
+        before: BeforeChange | None = None,
+        after: Callable[[str], None] = lambda state: None,
+    ) -> None:
         self.task_states = [f"{number}_{name}" for number, name in enumerate(task_names, start=1)]
         self._before = before
         self._after = after
@@ -100,7 +105,8 @@ class FlightMachine:
         return is_wanted
 
     async def _announce(self, event: Any) -> None:
-        await self._before(event.transition.source, event.transition.dest)
+        if self._before is not None:
+            await self._before(event.transition.source, event.transition.dest)
 
     def _tell(self, _event: Any) -> None:
         self._after(self.state)
