@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from drivers.camera.camera import Intrinsics
 from drivers.clock import NS_PER_S, Clock
 from mission import machine as m
-from mission.autopilot import Autopilot, AutopilotError, Setpoint, VehicleState
+from mission.autopilot import Autopilot, AutopilotError, FlightMode, Setpoint, VehicleState
 from mission.build import (
     build_task,
     fence,
@@ -186,6 +186,8 @@ class Executive:
         if self._resumption is not None:
             if origin is None:
                 return "the autopilot does not tell where on Earth it is, so that the mission cannot be resumed"
+            if state.is_armed:
+                self._resumption = self._resumption.in_the_air(self._plan)
             refusal = self._resumption.refusal(self._plan, state, vehicle_uid)
             if refusal is not None:
                 return refusal
@@ -203,6 +205,7 @@ class Executive:
     async def _fly(self) -> None:
         state = self._autopilot.state
         if self._resumption is not None and state is not None and state.is_armed:
+            self._helm.modes.accept(self._clock.now_ns(), FlightMode.HOLD)  # in which the pilot handed it over
             await self._rejoin(self._resumption)
         else:
             await self._machine.trigger_named("advance")

@@ -1,13 +1,14 @@
 """Before arming: connect, find out the facts, and wait until every check has passed."""
 
 import asyncio
+import contextlib
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from drivers.clock import NS_PER_S, Clock
-from mission.autopilot import Autopilot, AutopilotError, AutopilotKind, Identity
+from mission.autopilot import Autopilot, AutopilotError, AutopilotKind, FlightMode, Identity
 from mission.checks import Check
 from mission.eyes import Eyes
 from mission.parameter_checks import NAMES
@@ -105,12 +106,15 @@ async def wait_until_ready(
     answers, frames = _Answers(), _FrameRate()
     asking = asyncio.create_task(answers.ask(autopilot))
     final_since_s: float | None = None
+    has_left_offboard = False
     try:
         while True:
             frames.add(eyes.take())
             checks = check_all(_facts(autopilot, eyes, answers, frames, free_bytes(), may_fly=may_fly), plan)
             tell(tuple(dict.fromkeys(check.waits_for for check in checks if check.waits_for)))
             now_s = loop.time()
+            if answers.is_linked and not has_left_offboard:
+                has_left_offboard = await _leave_offboard(autopilot)
             has_failed = any(check.result is CheckResult.FAILED for check in checks)
             is_final = any(check.is_final for check in checks)
             final_since_s = None if not is_final else now_s if final_since_s is None else final_since_s
@@ -123,6 +127,19 @@ async def wait_until_ready(
     finally:
         asking.cancel()
         await asyncio.gather(asking, return_exceptions=True)
+
+
+async def _leave_offboard(autopilot: Autopilot) -> bool:
+    """A vehicle that a failsafe has landed stands in offboard, where PX4 does not arm: bring it to hold, once.
+
+    Only one that stands disarmed on the ground; returns whether that was done.
+    """
+    state = autopilot.state
+    if state is None or not_at_rest(state) is not None or state.mode is not FlightMode.OFFBOARD:
+        return False
+    with contextlib.suppress(AutopilotError):  # then it does not get ready, and the checks say so
+        await autopilot.hold()
+    return True
 
 
 def _facts(

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 
 from mission import plan as p
@@ -41,6 +41,17 @@ class Resumption:
     def index(self) -> int:
         """The index of the task that is taken up."""
         return self.standing.task_index
+
+    def in_the_air(self, plan: p.MissionPlan) -> "Resumption":
+        """The same for a vehicle that flies: where the take-off was interrupted, it has been done since."""
+        first = plan.tasks[0]
+        if self.index > 0 or not isinstance(first, p.Takeoff):
+            return self
+        place = self.start.model_copy(
+            update={"height_m": first.altitude_m, "altitude_m": self.start.altitude_m + first.altitude_m}
+        )
+        standing = self.standing.model_copy(update={"task_index": 1, "progress": 0.0})
+        return replace(self, standing=standing, place=place)
 
     def locate(self, origin: GlobalPoint, here: Setpoint) -> tuple[FlightMemory, Setpoint]:
         """The flight's memory, and the place to rejoin at, in the local frame that has its origin at `origin`.

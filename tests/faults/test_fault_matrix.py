@@ -1,9 +1,7 @@
 """Every fault in every task, flown in virtual time, against the declared table."""
 
-import multiprocessing
-import os
 from collections.abc import Iterator
-from concurrent.futures import Future, ProcessPoolExecutor
+from concurrent.futures import Future
 
 import pytest
 
@@ -12,20 +10,16 @@ from tests.faults.faults import FAULTS
 from tests.faults.flight import Flight, fly_case
 from tests.faults.page import PAGE, with_matrix
 from tests.faults.table import EXPECTED, TASKS, End, expected
+from tests.support.cores import chosen_cases, on_all_cores
 
 CASES = [(fault.name, task) for fault in FAULTS for task in TASKS]
 
 
 @pytest.fixture(scope="module")
 def flights(request: pytest.FixtureRequest) -> Iterator[dict[tuple[str, str], Future[Flight]]]:
-    """The flights of the tests that were chosen, on all cores: each is worked on while earlier ones are judged."""
-    chosen = [
-        (item.callspec.params["fault"], item.callspec.params["task"])
-        for item in request.session.items
-        if isinstance(item, pytest.Function) and item.originalname == "test_each_fault_in_each_task_ends_as_declared"
-    ]
-    with ProcessPoolExecutor(os.cpu_count(), multiprocessing.get_context("spawn")) as pool:
-        yield {case: pool.submit(fly_case, *case) for case in chosen}
+    cases = chosen_cases(request, "fault", "task")
+    with on_all_cores(fly_case, cases) as futures:
+        yield dict(zip(cases, futures, strict=True))
 
 
 @pytest.mark.parametrize(("fault", "task"), CASES)

@@ -101,12 +101,21 @@ def shipped(name: str) -> MissionPlan:
     return read_mission(MISSIONS / f"{name}.yaml").plan
 
 
-def bare_executive(plan: MissionPlan, autopilot: InProcessAutopilot, clock: VirtualClock) -> Executive:
-    """An executive over a vehicle that somebody else has made, with eyes and no log or journal."""
+def bare_executive(
+    plan: MissionPlan,
+    autopilot: InProcessAutopilot,
+    clock: VirtualClock,
+    *,
+    log: KeptLog | None = None,
+    journal: Journal | None = None,
+    resumption: Resumption | None = None,
+) -> Executive:
+    """An executive over a vehicle that somebody else has made, with eyes of its own."""
     camera = pinhole_intrinsics(plan.camera)
     eyes = GeometricEyes(autopilot, clock, camera, LINE_POINT_NED_M, LINE_HEADING_RAD)
-    logbook = Logbook(NoJournal(), PAPERS)
-    return Executive(plan, Crew(autopilot, eyes, camera, KeptLog(lambda _: None), logbook, ComputerView), clock)
+    logbook = Logbook(journal or NoJournal(), PAPERS)
+    crew = Crew(autopilot, eyes, camera, log or KeptLog(lambda _: None), logbook, ComputerView)
+    return Executive(plan, crew, clock, resumption)
 
 
 def fly(
@@ -117,8 +126,6 @@ def fly(
     in_task: str | None = None,
     after_s: float = 0.5,
     do: Callable[[Cockpit], None] | None = None,
-    journal: Journal | None = None,
-    resumption: Resumption | None = None,
 ) -> Flown:
     """Fly a plan to its end. `do` is called once, `after_s` into the first task named `in_task`."""
 
@@ -138,8 +145,8 @@ def fly(
                 loop.call_later(after_s, do, Cockpit(executive, autopilot, eyes, computer))
 
         log = KeptLog(on_record)
-        crew = Crew(autopilot, eyes, camera, log, Logbook(journal or NoJournal(), PAPERS), lambda: computer.view)
-        executive = Executive(plan, crew, clock, resumption)
+        crew = Crew(autopilot, eyes, camera, log, Logbook(NoJournal(), PAPERS), lambda: computer.view)
+        executive = Executive(plan, crew, clock)
         ended = await executive.run()
         if in_task is not None:
             assert has_done, f"the flight never came to {in_task}"

@@ -45,16 +45,25 @@ _LANDED = {
 class InProcessAutopilot:
     """A mission.autopilot.Autopilot. The vehicle is stepped up to the clock whenever anybody asks anything of it."""
 
-    def __init__(self, clock: Clock, *, start_yaw_rad: float = 0.0, wind_m_s: float = 0.0, seed: int = 1) -> None:
+    def __init__(
+        self,
+        clock: Clock,
+        *,
+        start_yaw_rad: float = 0.0,
+        wind_m_s: float = 0.0,
+        seed: int = 1,
+        sim: SimAutopilot | None = None,
+    ) -> None:
         self._clock = clock
-        self.sim = SimAutopilot(
+        self.sim = sim or SimAutopilot(
             Vehicle(yaw_rad=start_yaw_rad), Wind(wind_m_s, seed), seed=seed, parameters=Parameters(SETUP)
         )
-        self._heartbeat: tuple[Mode, bool] = (self.sim.mode, False)
-        self._heartbeat_s = 0.0
+        """The vehicle; one that is given flies on where another link has left it."""
+        self._heartbeat: tuple[Mode, bool] = (self.sim.mode, self.sim.is_armed)
+        self._heartbeat_s = self.sim.boot_s
         self._heartbeat_failsafe = False
         self._target: Setpoint | None = None
-        self._target_s = 0.0
+        self._target_s = self.sim.boot_s
         self.is_connected = True
         self.hears_us = True
         """Whether what we send reaches the vehicle. Setpoints that do not are lost in silence, commands unanswered."""
@@ -147,7 +156,9 @@ class InProcessAutopilot:
 
     def missing_health(self) -> list[str]:
         self.catch_up()
-        return [] if self.sim.boot_s > 5.0 else ["global position (GPS)"]
+        if self.sim.boot_s < 5.0:
+            return ["global position (GPS)"]
+        return [] if self.sim.commander.is_armable else ["the autopilot's own arming checks"]
 
     async def identify(self) -> Identity:
         return Identity(AutopilotKind.PX4, "1.16.1", "00000000000000000000000000000001")
@@ -191,6 +202,12 @@ class InProcessAutopilot:
     async def close(self) -> None:
         self._setpoint = None
         self._is_closed = True
+
+    def die(self) -> None:
+        """The program at this end was killed: nothing more is sent, its own thread's setpoints neither."""
+        self._setpoint = None
+        self._is_closed = True
+        self.hears_us = False
 
     def _command(self, name: str, act: Callable[[], Answer]) -> None:
         self.catch_up()
