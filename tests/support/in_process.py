@@ -94,6 +94,7 @@ class InProcessAutopilot:
             _LANDED[self.sim.landed],
             self.sim.battery.remaining,
             self.is_connected,
+            self._has_position,
         )
 
     def drain_status_texts(self) -> list[str]:
@@ -104,7 +105,11 @@ class InProcessAutopilot:
 
     def missing_health(self) -> list[str]:
         self.catch_up()
-        return [] if self.sim.boot_s > 5.0 else ["global position (GPS)"]
+        return [] if self._has_position else ["global position (GPS)"]
+
+    @property
+    def _has_position(self) -> bool:
+        return self.sim.boot_s > 5.0
 
     async def identify(self) -> Identity:
         return Identity(AutopilotKind.PX4, "1.16.1", "00000000000000000000000000000001")
