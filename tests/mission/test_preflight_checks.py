@@ -9,13 +9,14 @@ import pytest
 from mission.autopilot import AutopilotError, AutopilotKind, FlightMode, Identity, LandedState, VehicleState
 from mission.camera_plan import pinhole_intrinsics
 from mission.checks import Check
+from mission.executive import Executive
 from mission.offline_checks import check_offline
 from mission.plan import VehiclePlan
 from mission.preflight import wait_until_ready
 from mission.preflight_checks import Facts, check_all
-from mission.records import CheckResult
+from mission.records import CheckResult, MissionEnded, PreflightCheck, Result
 from tests.mission.test_parameter_checks import GOOD
-from tests.support.flights import LINE_HEADING_RAD, LINE_POINT_NED_M, shipped
+from tests.support.flights import LINE_HEADING_RAD, LINE_POINT_NED_M, KeptLog, shipped
 from tests.support.geometric_eyes import GeometricEyes
 from tests.support.in_process import InProcessAutopilot
 from tests.support.virtual_time import VirtualClock, run_virtually
@@ -185,3 +186,25 @@ def test_a_failure_that_lasts_a_moment_only_ends_nothing() -> None:
 
     checks, _ = wait(spoil)
     assert checks["battery"].result is OK
+
+
+def test_a_refused_vehicle_is_never_armed_and_the_log_says_why() -> None:
+    async def flight() -> tuple[MissionEnded, KeptLog, InProcessAutopilot, list[Check]]:
+        clock, log, told = VirtualClock(), KeptLog(lambda item: None), []
+        autopilot = InProcessAutopilot(clock)
+        autopilot.sim.set_parameter("RTL_RETURN_ALT", 12.0)
+        camera = pinhole_intrinsics(PLAN.camera)
+        eyes = GeometricEyes(autopilot, clock, camera, LINE_POINT_NED_M, LINE_HEADING_RAD)
+        executive = Executive(PLAN, autopilot, eyes, log, clock, camera, lambda: 10**12, told.extend)
+        ended = await executive.run()
+        assert not executive.may_have_armed
+        return ended, log, autopilot, told
+
+    ended, log, autopilot, told = run_virtually(flight())
+    assert ended.result is Result.FAILED
+    assert "return altitude: RTL_RETURN_ALT is 12 m" in ended.reason
+    assert autopilot.commands == []
+    records = {item.name: item for item in log.items if isinstance(item, PreflightCheck)}
+    assert records["return_altitude"].result is FAILED
+    assert records["offboard_loss_action"].result is OK
+    assert list(records) == [check.name for check in told]
