@@ -67,7 +67,8 @@ class VehicleState:
     """The vehicle as telemetry tells it; `t_ns` is flight time when the older of position and attitude arrived.
 
     Position NED [m], velocity NED [m/s], attitude [rad] (FRD body to NED), battery 0 to 1 (None: not known yet).
-    `is_position_ok` says whether the autopilot trusts its position, local and global (about once a second: SYS_STATUS).
+    `is_failsafe` says that the autopilot acts against what it was told (MAV_STATE_CRITICAL), `is_position_ok` that it
+    knows where it is.
     """
 
     t_ns: int
@@ -85,7 +86,17 @@ class VehicleState:
     landed: LandedState
     battery: float | None
     is_connected: bool
+    is_failsafe: bool = False
     is_position_ok: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class GlobalPoint:
+    """A place on Earth: WGS-84 latitude and longitude [rad], altitude above mean sea level [m]."""
+
+    latitude_rad: float
+    longitude_rad: float
+    altitude_m: float
 
 
 class AutopilotError(Exception):
@@ -108,12 +119,21 @@ class Autopilot(Protocol):
         """The newest telemetry; None until position, attitude, mode and landed state were all seen."""
         ...
 
+    @property
+    def target(self) -> Setpoint | None:
+        """Where the autopilot says that it flies to (POSITION_TARGET_LOCAL_NED); None while it has not said."""
+        ...
+
     def drain_status_texts(self) -> list[str]:
         """The autopilot's own words since the last call, oldest first."""
         ...
 
     async def connect(self) -> None:
         """Find the autopilot and start its streams."""
+        ...
+
+    async def read_origin(self) -> GlobalPoint | None:
+        """Where the local frame has its origin (GPS_GLOBAL_ORIGIN); None where the autopilot does not know."""
         ...
 
     def missing_health(self) -> list[str]:

@@ -7,6 +7,7 @@ subscriptions must be cancelled before `destroy()`, or they hang for ever.
 
 import asyncio
 import contextlib
+import json
 import math
 from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from typing import Any, TypeVar
@@ -15,6 +16,7 @@ from mavsdk import Autopilot as MavsdkKind
 from mavsdk.asyncio import ComponentType, Configuration, Mavsdk, MavsdkConnectionError, MavsdkError
 from mavsdk.asyncio.plugins.action import ActionAsync
 from mavsdk.asyncio.plugins.info import InfoAsync
+from mavsdk.asyncio.plugins.mavlink_direct import MavlinkDirectAsync
 from mavsdk.asyncio.plugins.offboard import OffboardAsync, PositionNedYaw
 from mavsdk.asyncio.plugins.param import ParamAsync
 from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
@@ -28,6 +30,7 @@ from mission.autopilot import (
     AutopilotError,
     AutopilotKind,
     FlightMode,
+    GlobalPoint,
     Identity,
     LandedState,
     NoAnswerError,
@@ -41,10 +44,13 @@ FIND_TIMEOUT_S = 20.0
 COMMAND_TIMEOUT_S = 5.0
 SETPOINT_TIMEOUT_S = 0.5
 IDENTIFY_TIMEOUT_S = 5.0
+ORIGIN_TIMEOUT_S = 3.0
 PARAMETER_TIMEOUT_S = 6.0
 """MAVSDK itself asks for a parameter six times, which takes 3 s for one that the autopilot does not have."""
 
 _IDENTIFY_POLL_S = 0.2
+_AUTOPILOT_COMPONENT = 1  # MAV_COMP_ID_AUTOPILOT1
+_FAILSAFE_STATES = (5, 6)  # MAV_STATE_CRITICAL, MAV_STATE_EMERGENCY
 _TELEMETRY_RATE_HZ = 50.0
 _BATTERY_RATE_HZ = 2.0
 
@@ -92,7 +98,9 @@ class MavsdkAutopilot:
         self._offboard: Any = None
         self._subscriptions: list[asyncio.Task[None]] = []
         self._reading: asyncio.Task[float] | None = None
-        self._newest: dict[str, Any] = {"connected": True, "battery": None}
+        self._telemetry: Any = None
+        self._target: Setpoint | None = None
+        self._newest: dict[str, Any] = {"connected": True, "battery": None, "failsafe": False}
         self._position_ns = 0
         self._attitude_ns = 0
         self._status_texts: list[str] = []
@@ -121,8 +129,24 @@ class MavsdkAutopilot:
             landed=_LANDED.get(newest["landed"], LandedState.UNKNOWN),
             battery=newest["battery"],
             is_connected=newest["connected"],
+            is_failsafe=newest["failsafe"],
             is_position_ok=self._is_position_ok(),
         )
+
+    @property
+    def target(self) -> Setpoint | None:
+        """Where the autopilot says that it flies to; None while it has not said."""
+        return self._target
+
+    async def read_origin(self) -> GlobalPoint | None:
+        """Where the local frame has its origin; None where the autopilot does not know."""
+        try:
+            origin = await self._call("tell its origin", self._telemetry.get_gps_global_origin(), ORIGIN_TIMEOUT_S)
+        except AutopilotError:
+            return None
+        if not all(map(math.isfinite, (origin.latitude_deg, origin.longitude_deg, origin.altitude_m))):
+            return None
+        return GlobalPoint(math.radians(origin.latitude_deg), math.radians(origin.longitude_deg), origin.altitude_m)
 
     def drain_status_texts(self) -> list[str]:
         """The autopilot's own words since the last call, oldest first."""
@@ -155,7 +179,8 @@ class MavsdkAutopilot:
         self._system = system
         self._action = ActionAsync(system)
         self._offboard = OffboardAsync(system)
-        telemetry = TelemetryAsync(system)
+        direct = MavlinkDirectAsync(system)
+        telemetry = self._telemetry = TelemetryAsync(system)
         streams: list[tuple[AsyncIterator[Any], Callable[[Any], None]]] = [
             (telemetry.subscribe_position_velocity_ned(), self._take_position),
             (telemetry.subscribe_attitude_euler(), self._take_attitude),
@@ -166,6 +191,8 @@ class MavsdkAutopilot:
             (telemetry.subscribe_battery(), self._take_battery),
             (telemetry.subscribe_status_text(), self._take_status_text),
             (system.is_connected_state(), self._keep("connected")),
+            (direct.subscribe_message("HEARTBEAT"), self._take_heartbeat),
+            (direct.subscribe_message("POSITION_TARGET_LOCAL_NED"), self._take_target),
         ]
         self._subscriptions = [asyncio.create_task(self._pump(stream, take)) for stream, take in streams]
         await self._call("set the rate of positions", telemetry.set_rate_position_velocity_ned(_TELEMETRY_RATE_HZ))
@@ -286,6 +313,17 @@ class MavsdkAutopilot:
     def _take_battery(self, item: Any) -> None:
         percent = float(item.remaining_percent)
         self._newest["battery"] = None if math.isnan(percent) else percent / 100
+
+    def _take_heartbeat(self, message: Any) -> None:
+        """MAVSDK's own streams leave out the state of the system, which tells a failsafe from a pilot's choice."""
+        if message.component_id == _AUTOPILOT_COMPONENT:
+            self._newest["failsafe"] = json.loads(message.fields_json).get("system_status") in _FAILSAFE_STATES
+
+    def _take_target(self, message: Any) -> None:
+        fields = json.loads(message.fields_json)
+        place = [fields.get(key) for key in ("x", "y", "z", "yaw")]
+        if all(isinstance(value, int | float) and math.isfinite(value) for value in place):
+            self._target = Setpoint(*place)
 
     def _take_status_text(self, item: Any) -> None:
         self._status_texts.append(str(item.text).strip())

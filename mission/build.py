@@ -8,7 +8,9 @@ from drivers.camera.camera import Intrinsics
 from mission import plan as p
 from mission.geofence import Fence
 from mission.guidance import GuidanceSettings
-from mission.safety import Hazard, Reaction, SafetyLimits
+from mission.hazards import SafetyLimits
+from mission.limits import SetpointLimits
+from mission.safety import Hazard, Reaction
 from mission.tasks.align import AlignTask
 from mission.tasks.change_altitude import ChangeAltitudeTask
 from mission.tasks.follow_lines import FollowLinesTask
@@ -17,6 +19,7 @@ from mission.tasks.hold import HoldTask
 from mission.tasks.move_forward import MoveForwardTask
 from mission.tasks.move_until import MoveUntilTask
 from mission.tasks.rotate import RotateTask
+from mission.tasks.search_line import SearchSettings
 from mission.tasks.takeoff import TakeoffTask
 from mission.tasks.task import Command, FlightMemory, Task
 from vision.pipeline import VisionSettings
@@ -48,10 +51,24 @@ def safety_limits(plan: p.SafetyPlan) -> SafetyLimits:
         max_distance_m=plan.max_distance_m,
         max_altitude_m=plan.max_altitude_m,
         line_lost_s=plan.line_lost_s,
+        estimate_stale_s=plan.estimate_stale_s,
         telemetry_stale_s=plan.telemetry_stale_s,
+        position_bad_s=plan.position_bad_s,
         battery_low=plan.battery_low_percent / 100,
         battery_critical=plan.battery_critical_percent / 100,
+        min_disk_bytes=round(plan.min_disk_mb * 1e6),
     )
+
+
+def setpoint_limits(plan: p.MissionPlan) -> SetpointLimits:
+    """What no setpoint of the mission may pass."""
+    return SetpointLimits(plan.guidance.leash_m, plan.safety.max_distance_m, plan.safety.max_altitude_m)
+
+
+def search_settings(plan: p.SafetyPlan) -> SearchSettings:
+    """How a lost line is searched for, in the program's units."""
+    search = plan.line_search
+    return SearchSettings(search.climb_m, math.radians(search.sweep_deg), search.back_m, search.n_detections)
 
 
 def fence(plan: p.SafetyPlan) -> Fence:
@@ -97,6 +114,6 @@ def build_task(plan: p.AnyTask, guidance: GuidanceSettings, memory: FlightMemory
         case p.Hold():
             return HoldTask(plan.duration_s)
         case p.Return():
-            return GoDownTask(Command.RETURN)
+            return GoDownTask(Command.RETURN, memory)
         case p.Land():
-            return GoDownTask(Command.LAND)
+            return GoDownTask(Command.LAND, memory)

@@ -22,7 +22,9 @@ from mission.log.errors import LogError
 if TYPE_CHECKING:
     from mission.flight import FlightOutcome, FlightSetup
     from mission.log.summary import FlightReport
+    from mission.plan import MissionPlan
     from mission.plan_file import MissionFile
+    from mission.resumption import Resumption
     from mission.simulation import Simulation
 
 EXIT_FAILED_FILE = 1
@@ -123,25 +125,75 @@ def run(
     """Fly a mission with a real vehicle, PX4 SITL, or `lineflight sitl`."""
     mission_file = _read_mission(mission)
     plan = mission_file.plan
+    _run(mission_file, connection or plan.vehicle.connection, camera or plan.camera.source, log, as_json, None)
+
+
+def _run(
+    mission_file: "MissionFile",
+    connection: str,
+    camera: str,
+    log: Path,
+    as_json: bool,
+    resumed: "tuple[MissionPlan, Resumption] | None",
+) -> NoReturn:
+    """Fly a mission, or what is left of it, with a vehicle that flies elsewhere."""
     from mission.flight import FlightSetup
     from mission.live_camera import CameraError, LiveCamera
 
     try:
-        source = LiveCamera(camera or plan.camera.source, plan.camera, mission_file.camera)
+        source = LiveCamera(camera, mission_file.plan.camera, mission_file.camera)
     except CameraError as error:
         _fail(str(error), EXIT_BAD_INPUT)
     with source:
         setup = FlightSetup(
             mission=mission_file,
-            connection=connection or plan.vehicle.connection,
+            connection=connection,
             open_camera=source.open_camera,
             clock=source.clock,
             log_folder=log,
-            metadata={"command": "run", "camera": camera or plan.camera.source},
+            metadata={"command": "run" if resumed is None else "resume", "camera": camera},
             feed_pose=source.feed_pose,
+            remaining=None if resumed is None else resumed[0],
+            resumption=None if resumed is None else resumed[1],
         )
         outcome = _fly(setup)
     _finish(outcome, as_json=as_json, simulation=None)
+
+
+@app.command()
+def resume(
+    journal: Annotated[
+        Path | None, typer.Argument(help="The journal (*.journal) beside a flight's log; else the newest one in --log.")
+    ] = None,
+    explain: Annotated[bool, typer.Option("--explain", help="Only say what it would do, and why.")] = False,
+    connection: Annotated[str | None, typer.Option(help="MAVSDK URL; else the interrupted flight's.")] = None,
+    camera: Annotated[str | None, typer.Option(help="v4l2:DEVICE or sim:WORLD; else the interrupted flight's.")] = None,
+    log: LogOption = Path("logs"),
+    as_json: JsonOption = False,
+) -> None:
+    """Take an interrupted mission up again, from its journal: after a crash, a takeover, or a change of battery."""
+    from mission.journal import JournalError, newest_journal, read_journal
+    from mission.resumption import CannotResumeError, explain_resumption, find_resumption
+
+    try:
+        path = journal or newest_journal(log)
+        begin, entries = read_journal(path)
+        mission_file = _read_mission(Path(begin.mission_path))
+        remaining, resumption = find_resumption(begin, entries, mission_file.plan, mission_file.sha256)
+    except (JournalError, CannotResumeError) as error:
+        _fail(_sentence(str(error)), EXIT_BAD_INPUT)
+    typer.echo(f"journal  {path}", err=True)
+    for line in explain_resumption(remaining, resumption, begin):
+        typer.echo(line, err=not explain)
+    if explain:
+        return
+    if begin.camera == "dry-run" and camera is None and connection is None:
+        _fail("That was a dry-run: its vehicle is gone. To try it, fly with lineflight sitl and run.", EXIT_BAD_INPUT)
+    _run(mission_file, connection or begin.connection, camera or begin.camera, log, as_json, (remaining, resumption))
+
+
+def _sentence(words: str) -> str:
+    return words[:1].upper() + words[1:].rstrip(".") + "."
 
 
 @app.command()
@@ -235,6 +287,7 @@ def _fly(setup: "FlightSetup") -> "FlightOutcome":
     from rich.console import Console
 
     from mission.flight import fly
+    from mission.guard import GuardError
     from mission.watch import Watch
 
     try:
@@ -242,6 +295,8 @@ def _fly(setup: "FlightSetup") -> "FlightOutcome":
             return asyncio.run(fly(setup, watch.show, watch.tell_checks))
     except LogError as error:
         _fail(str(error), EXIT_FAILED_FILE)
+    except GuardError as error:
+        _fail(str(error), EXIT_NOT_READY)
 
 
 def _finish(outcome: "FlightOutcome", *, as_json: bool, simulation: "Simulation | None") -> NoReturn:

@@ -6,28 +6,36 @@ task for the next step, and sends it. It never waits for vision. [Ceron] section
 
 import asyncio
 import contextlib
-import math
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 
 from drivers.camera.camera import Intrinsics
 from drivers.clock import NS_PER_S, Clock
 from mission import machine as m
 from mission.autopilot import Autopilot, AutopilotError, Setpoint, VehicleState
-from mission.build import build_task, guidance_settings, reactions, safety_limits
+from mission.build import build_task, guidance_settings, reactions, safety_limits, search_settings, setpoint_limits
 from mission.checks import Check
-from mission.eyes import Eyes, Lookout
-from mission.helm import Helm
+from mission.detours import Detour, detour_task
+from mission.eyes import Eyes
+from mission.hazards import TaskView, find_hazards
+from mission.helm import Helm, UnsafeSetpointError
+from mission.limits import floor_m
+from mission.logbook import Logbook
 from mission.plan import MissionPlan
 from mission.preflight import wait_until_ready
-from mission.records import CheckResult, Event, MissionEnded, PreflightCheck, Result, Severity, TaskEnded, TaskStarted
+from mission.records import Event, MissionEnded, PreflightCheck, Result, Severity, TaskEnded, TaskStarted
 from mission.reporting import FlightLog, Progress
-from mission.safety import Hazard, Reaction, SafetyInput, decide, find_hazards, keep_going_down, way_down
+from mission.resumption import Resumption
+from mission.safety import PAUSES, Hazard, Reaction, decide, keep_going_down, way_down
+from mission.situation import Computer, Situation, Troubles
 from mission.tasks.go_down import GoDownTask
+from mission.tasks.rejoin import RejoinTask
 from mission.tasks.task import Command, FlightMemory, Observation, Task
 
 CONTROL_RATE_HZ = 20.0
 PAUSE_BEFORE_GOING_DOWN_S = 2.0
 GOING_DOWN_LIMIT_S = 300.0
+REJOINING_LIMIT_S = 300.0
 
 _STAYS_CLEAR = ("takeoff", "ascend", "descend", "rotate", "hold", "land", "return")
 """Tasks that do not carry the vehicle anywhere over ground by themselves; the others may bring it over the line."""
@@ -37,60 +45,76 @@ _RESULTS = {
     Hazard.INTERRUPTED: Result.INTERRUPTED,
     Hazard.TASK_TIMED_OUT: Result.TIMED_OUT,
     Hazard.TAKEOVER: Result.TAKEN_OVER,
+    Hazard.AUTOPILOT_FAILSAFE: Result.TAKEN_OVER,
+    Hazard.OFFBOARD_REFUSED: Result.TAKEN_OVER,
 }
+
+
+@dataclass(frozen=True, slots=True)
+class Crew:
+    """Whom the executive works with: the vehicle, the eyes, the log, the journal, and who knows how the computer does.
+
+    `camera` is the eyes'.
+    """
+
+    autopilot: Autopilot
+    eyes: Eyes
+    camera: Intrinsics
+    log: FlightLog
+    logbook: Logbook
+    computer: Computer
 
 
 class Executive:
     """Flies one mission; `run` once. `request_stop` may be called at any time from the event loop.
 
-    `free_bytes` tells the room on the log's disk; `on_checks` hears the pre-flight checks once, before arming.
+    With a `resumption` it takes an interrupted mission up again; `plan` then holds what is left of it.
+    `on_checks` hears the pre-flight checks once, before arming.
     """
 
     def __init__(
         self,
         plan: MissionPlan,
-        autopilot: Autopilot,
-        eyes: Eyes,
-        log: FlightLog,
+        crew: Crew,
         clock: Clock,
-        camera: Intrinsics,
-        free_bytes: Callable[[], int | None] = lambda: None,
+        resumption: Resumption | None = None,
         on_checks: Callable[[Sequence[Check]], None] = lambda checks: None,
     ) -> None:
-        self._free_bytes = free_bytes
-        self._on_checks = on_checks
         self._plan = plan
-        self._autopilot = autopilot
-        self._eyes = eyes
-        self._log = log
+        self._crew = crew
+        self._autopilot = crew.autopilot
+        self._log = crew.log
         self._clock = clock
+        self._resumption = resumption
+        self._on_checks = on_checks
         self._guidance = guidance_settings(plan.guidance)
         self._limits = safety_limits(plan.safety)
         self._reactions = reactions(plan.safety)
-        self._machine = m.FlightMachine([task.task for task in plan.tasks], self._on_change)
-        self._lookout = Lookout(eyes, log, camera, self._guidance)
-        self._helm = Helm(autopilot, log, clock, self._guidance.leash_m)
-        self._memory = FlightMemory(Setpoint(0.0, 0.0, 0.0, 0.0), 0.0)
+        self._search = search_settings(plan.safety)
+        self._machine = m.FlightMachine([task.task for task in plan.tasks], self._before_change, self._after_change)
+        self._situation = Situation(
+            crew.autopilot, crew.eyes, crew.log, clock, crew.camera, self._guidance, crew.computer
+        )
+        self._helm = Helm(crew.autopilot, crew.log, clock, setpoint_limits(plan))
         self._task: Task | None = None
+        self._detour: Detour | None = None
+        self._rejoin_at = Setpoint(0.0, 0.0, 0.0, 0.0)
         self._task_started_ns = 0
         self._may_be_over_line = False
-        self._is_interrupted = False
-        self._was_armed = False
-        self._task_failure: str | None = None
-        self._refusal: str | None = None
-        self._internal_error: str | None = None
         self._noted: set[Hazard] = set()
         self._end: tuple[Result, str] = (Result.FAILED, "")
         self.progress = Progress(m.PREFLIGHT, None, None, None)
+        self.tick_s: float | None = None
+        """When the last control tick began, in the event loop's time [s]; None before and after the flight."""
 
     @property
     def may_have_armed(self) -> bool:
         """Whether the vehicle was armed, or told to without a refusal."""
-        return self._helm.was_told_to_arm or self._was_armed
+        return self._helm.was_told_to_arm or self._situation.was_armed
 
     def request_stop(self) -> None:
         """Ask the flight to end now: before arming at once, in the air by the mission's reaction."""
-        self._is_interrupted = True
+        self._situation.is_interrupted = True
 
     async def run(self) -> MissionEnded:
         """Fly the mission to its end, and say how it ended.
@@ -107,6 +131,8 @@ class Executive:
                     with contextlib.suppress(AutopilotError):
                         await self._autopilot.hold()
                 raise
+            finally:
+                self.tick_s = None
             ended = MissionEnded(self._clock.now_ns(), *self._end)
         self._log.record(ended)
         return ended
@@ -115,46 +141,72 @@ class Executive:
         """Wait until all is ready; the end of the mission if that never comes."""
 
         def tell(missing: tuple[str, ...]) -> None:
-            self._keep_status_texts()
-            self._lookout.keep_notices(self._clock.now_ns())
+            self._situation.keep_words()
             self.progress = Progress(m.PREFLIGHT, None, None, None, waiting_for=missing)
 
-        checks = await wait_until_ready(
+        ready = await wait_until_ready(
             self._autopilot,
-            self._eyes,
+            self._crew.eyes,
             self._clock,
             self._plan,
-            self._free_bytes,
-            lambda: self._is_interrupted,
+            lambda: self._crew.computer().free_disk_bytes,
+            lambda: self._situation.is_interrupted,
             tell,
+            may_fly=self._resumption is not None,
         )
-        for check in checks:
+        for check in ready.checks:
             self._log.record(PreflightCheck(self._clock.now_ns(), check.name, check.result, check.reason))
-        self._on_checks(checks)
-        missing = [check.line for check in checks if check.result is CheckResult.FAILED]
+        self._on_checks(ready.checks)
         state = self._autopilot.state
-        if self._is_interrupted:
+        if self._situation.is_interrupted:
             await self._machine.trigger_named("interrupt")
             return MissionEnded(self._clock.now_ns(), Result.INTERRUPTED, "stopped before arming")
-        if missing or state is None:
+        words = None
+        if ready.failures or state is None:
+            words = "not ready to fly: " + "; ".join(ready.failures)
+        else:
+            words = await self._begin(state, "" if ready.identity is None else ready.identity.uid)
+        if words is not None:
             await self._machine.trigger_named("fail")
-            return MissionEnded(self._clock.now_ns(), Result.FAILED, "not ready to fly: " + "; ".join(missing))
-        start = Setpoint(state.north_m, state.east_m, state.down_m, state.yaw_rad)
-        theta_0_rad = self._guidance.theta_0_rad
-        self._memory = FlightMemory(start, state.yaw_rad if theta_0_rad is None else theta_0_rad)
-        self._helm.reference = start
+            return MissionEnded(self._clock.now_ns(), Result.FAILED, words)
+        return None
+
+    async def _begin(self, state: VehicleState, vehicle_uid: str) -> str | None:
+        """Know where the flight begins; returns in a sentence why it must not."""
+        here = Setpoint(state.north_m, state.east_m, state.down_m, state.yaw_rad)
+        origin = await self._autopilot.read_origin()
+        if self._resumption is not None:
+            if origin is None:
+                return "the autopilot does not tell where on Earth it is, so that the mission cannot be resumed"
+            refusal = self._resumption.refusal(self._plan, state, vehicle_uid)
+            if refusal is not None:
+                return refusal
+            memory, self._rejoin_at = self._resumption.locate(origin, here)
+        else:
+            theta_0_rad = self._guidance.theta_0_rad
+            memory = FlightMemory(here, state.yaw_rad if theta_0_rad is None else theta_0_rad)
+        self._situation.begin(memory)
+        self._helm.start, self._helm.reference = memory.start, here
+        await self._crew.logbook.begin(origin, memory, vehicle_uid, self._resumption)
         return None
 
     # -- the control loop ----------------------------------------------------------------------------------------
 
     async def _fly(self) -> None:
-        await self._machine.trigger_named("advance")
-        self._start_task()
+        state = self._autopilot.state
+        if self._resumption is not None and state is not None and state.is_armed:
+            await self._rejoin(self._resumption)
+        else:
+            await self._machine.trigger_named("advance")
+            self._start_task()
+        loop = asyncio.get_running_loop()
         period_ns = round(NS_PER_S / CONTROL_RATE_HZ)
         last_ns = self._clock.now_ns()
         deadline_ns = last_ns
         while not self._machine.is_over:
             now_ns = self._clock.now_ns()
+            self.tick_s = loop.time()
+            self._situation.pace.tick(self._clock.wall_s((now_ns - deadline_ns) / NS_PER_S))
             # A late tick must not become one large step: what was missed is lost, and the vehicle waits.
             dt_s = min((now_ns - last_ns) / NS_PER_S, 2.0 / CONTROL_RATE_HZ)
             last_ns = now_ns
@@ -166,36 +218,38 @@ class Executive:
         state = self._autopilot.state
         if state is None or self._task is None:
             raise RuntimeError("a flight without telemetry or task")
-        self._was_armed = self._was_armed or state.is_armed
-        self._log.record(state)
-        self._keep_status_texts()
-        sight = None
-        try:
-            sight = self._lookout.look(now_ns, state)
-        except Exception as error:
-            self._internal_error = f"{type(error).__name__} while placing the line: {error}"
+        situation = self._situation
+        sight = situation.look(now_ns, dt_s, state, self._helm)
         self._show(state)
+        self._crew.logbook.note(self._clock.now_ns(), self._machine.task_index, self._task.progress, state)
         if await self._react(now_ns, state):
             return
+        flown = self._task if self._detour is None else self._detour.task
         try:
-            step = self._task.step(self._helm.reference, Observation(dt_s, state, sight))
+            step = flown.step(self._helm.reference, Observation(dt_s, state, sight))
             await self._helm.do(step, state)
         except AutopilotError as error:
             self._note_refusal(str(error))
             return
-        except Exception as error:
-            self._internal_error = f"{type(error).__name__} in {self._machine.state}: {error}"
+        except UnsafeSetpointError as error:
+            situation.troubles.unsafe_setpoint = str(error)
             return
-        self._task_failure = step.failed
+        except Exception as error:
+            situation.troubles.internal_error = f"{type(error).__name__} in {self._machine.state}: {error}"
+            return
+        situation.troubles.task_failure = step.failed
         if step.done is not None:
-            await self._end_task(Result.COMPLETED, step.done)
+            if self._detour is not None:
+                await self._carry_on(step.done)
+            else:
+                await self._end_task(Result.COMPLETED, step.done)
 
     def _note_refusal(self, words: str) -> None:
         """On the way down a refusal is noted, and the task asks again; before that it is a hazard."""
         if isinstance(self._task, GoDownTask):
             self._log.record(Event(self._clock.now_ns(), Hazard.COMMAND_REFUSED, Severity.WARNING, words))
         else:
-            self._refusal = words
+            self._situation.troubles.refusal = words
 
     # -- tasks ---------------------------------------------------------------------------------------------------
 
@@ -204,83 +258,150 @@ class Executive:
         if index is None:
             return
         plan = self._plan.tasks[index]
-        self._task = build_task(plan, self._guidance, self._memory)
+        self._task = build_task(plan, self._guidance, self._situation.memory)
         self._task_started_ns = self._clock.now_ns()
-        self._lookout.line_seen_ns = self._task_started_ns
+        self._situation.expect_line(self._task_started_ns)
+        self._set_floor(getattr(plan, "altitude_m", None))
         self._may_be_over_line = self._may_be_over_line or plan.task not in _STAYS_CLEAR
         self._log.record(TaskStarted(self._task_started_ns, index, plan.task))
+
+    def _set_floor(self, goal_m: float | None) -> None:
+        """A task that starts from the ground has none to keep to."""
+        height_m = self._altitude_m()
+        heights_m = [height_m] if goal_m is None else [height_m, goal_m]
+        self._helm.floor_m = floor_m(*heights_m)
 
     async def _end_task(self, result: Result, reason: str) -> None:
         """Close the task in the log; after a completed one go on with the next, or end the flight."""
         index = self._machine.task_index
-        if index is not None:
+        if index is not None and self._machine.state != m.REJOINING:
             self._log.record(TaskEnded(self._clock.now_ns(), index, self._plan.tasks[index].task, result, reason))
         if result is not Result.COMPLETED:
             return
         if index is None:  # going down has ended: the mission ends as the reaction said
             await self._machine.trigger_named(_TRIGGERS[self._end[0]])
             return
+        if index == 0 and self._resumption is not None and self._resumption.index > 0:
+            await self._rejoin(self._resumption)
+            return
         await self._machine.trigger_named("advance")
         if self._machine.is_over:
             self._end = (Result.COMPLETED, reason)
         self._start_task()
+
+    # -- detours: what pauses a task ---------------------------------------------------------------------------------
+
+    async def _rejoin(self, resumption: Resumption) -> None:
+        """Fly to where the mission was interrupted; from there the task is taken up."""
+        await self._machine.trigger_named("rejoin", towards=resumption.index)
+        now_ns = self._clock.now_ns()
+        self._may_be_over_line = True
+        self._set_floor(resumption.place.height_m)
+        self._task_started_ns = now_ns
+        self._task = build_task(self._plan.tasks[resumption.index], self._guidance, self._situation.memory)
+        transit_down_m = self._situation.memory.start.down_m - resumption.transit_height_m
+        rejoin = RejoinTask(self._rejoin_at, transit_down_m, self._guidance)
+        self._detour = Detour(rejoin, None, Reaction.CONTINUE, now_ns)
+
+    async def _pause(self, hazard: Hazard, reaction: Reaction, words: str) -> None:
+        """Pause the task: hold, climb and hold, or search."""
+        now_ns = self._clock.now_ns()
+        self._log.record(Event(now_ns, hazard, Severity.WARNING, words, reaction))
+        await self._machine.trigger_named("search" if reaction is Reaction.SEARCH else "pause")
+        room_m = self._plan.safety.max_altitude_m - self._altitude_m() - 1.0
+        task = detour_task(reaction, self._search, room_m, self._situation.memory, self._guidance)
+        self._detour = Detour(task, hazard, reaction, now_ns)
+        self._situation.expect_line(now_ns)
+
+    async def _carry_on(self, words: str) -> None:
+        """The detour is over: go on with the task. Its time limit does not count the detour."""
+        was_rejoining = self._machine.state == m.REJOINING
+        await self._machine.trigger_named("carry_on")
+        now_ns = self._clock.now_ns()
+        if self._detour is not None:
+            self._task_started_ns += now_ns - self._detour.started_ns
+        self._detour = None
+        self._situation.expect_line(now_ns)
+        if was_rejoining:
+            self._start_task()
+        else:
+            self._log.record(Event(now_ns, "carried_on", Severity.INFO, words))
 
     # -- safety --------------------------------------------------------------------------------------------------
 
     async def _react(self, now_ns: int, state: VehicleState) -> bool:
         """Find hazards and act on the most urgent; true when the task must not step in this tick."""
         is_going_down = self._machine.state == m.GOING_DOWN
-        hazards = find_hazards(self._safety_input(now_ns, state), self._limits)
+        seen = self._situation.safety_input(now_ns, state, self._helm, self._task_view(now_ns))
+        hazards = find_hazards(seen, self._limits)
         if is_going_down:
             hazards = keep_going_down(hazards)
         decision = decide(hazards, self._reactions, is_offboard=self._helm.modes.is_offboard)
+        self._note_hazards(now_ns, hazards, decision)
+        if self._detour is not None and (decision is None or decision[1] in PAUSES):
+            action = self._detour.next(now_ns, decision, self._plan.safety.hold_limit_s)
+            if action == "carry_on":
+                await self._carry_on(f"{self._detour.hazard} is over")
+            if action != "too_long" or decision is None:
+                return action != "step"
+            hazard, reaction = decision[0], Reaction.LAND_CLEAR
+        elif decision is None:
+            return False
+        else:
+            hazard, reaction = decision
+            if reaction in PAUSES:
+                await self._pause(hazard, reaction, hazards[hazard])
+                return True
+        if is_going_down:
+            reaction = Reaction.GIVE_UP_CONTROL
+        await self._end_early(now_ns, hazard, reaction, hazards[hazard])
+        return True
+
+    async def _end_early(self, now_ns: int, hazard: Hazard, reaction: Reaction, words: str) -> None:
+        """End the mission: give up control, or go down."""
+        wanted, reaction = reaction, way_down(reaction, may_be_over_line=self._may_be_over_line)
+        self._log.record(Event(now_ns, hazard, Severity.ERROR, words, reaction))
+        self._end = (_RESULTS.get(hazard, Result.FAILED), f"{hazard.replace('_', ' ')}: {words}")
+        await self._end_task(*self._end)
+        if reaction is Reaction.GIVE_UP_CONTROL:
+            # Touch nothing more: the pilot, or the autopilot's own failsafe, has the vehicle.
+            await self._machine.trigger_named("give_up" if self._end[0] is Result.TAKEN_OVER else "lose")
+        else:
+            await self._go_down(hazard, wanted, reaction)
+
+    def _note_hazards(self, now_ns: int, hazards: dict[Hazard, str], decision: tuple[Hazard, Reaction] | None) -> None:
+        """Log each hazard that is not the one reacted to, once."""
         for hazard, words in hazards.items():
             if hazard not in self._noted and (decision is None or hazard is not decision[0]):
                 self._noted.add(hazard)
                 self._log.record(Event(now_ns, hazard, Severity.WARNING, words))
-        if decision is None:
-            return False
-        hazard, reaction = decision
-        if is_going_down:
-            reaction = Reaction.GIVE_UP_CONTROL
-        reaction = way_down(reaction, may_be_over_line=self._may_be_over_line)
-        self._log.record(Event(now_ns, hazard, Severity.ERROR, hazards[hazard], reaction))
-        self._end = (_RESULTS.get(hazard, Result.FAILED), f"{hazard.replace('_', ' ')}: {hazards[hazard]}")
-        await self._end_task(*self._end)
-        if reaction is Reaction.GIVE_UP_CONTROL:
-            # Touch nothing more: the pilot, or the autopilot's own failsafe, has the vehicle.
-            await self._machine.trigger_named("give_up")
-        else:
-            await self._go_down(hazard, reaction)
-        return True
 
-    def _safety_input(self, now_ns: int, state: VehicleState) -> SafetyInput:
+    def _task_view(self, now_ns: int) -> TaskView:
         index = self._machine.task_index
-        task = self._task
-        return SafetyInput(
-            now_ns=now_ns,
-            state=state,
-            allowed_modes=self._helm.modes.explained(now_ns, state),
-            distance_m=self._from_start_m(state),
-            altitude_m=self._memory.start.down_m - state.down_m,
-            was_armed=self._was_armed,
-            is_going_down=isinstance(task, GoDownTask),
-            task_age_s=(now_ns - self._task_started_ns) / NS_PER_S,
-            task_limit_s=GOING_DOWN_LIMIT_S if index is None else self._plan.tasks[index].time_limit_s,
-            needs_line=task is not None and task.needs_line,
-            line_seen_ns=self._lookout.line_seen_ns,
-            needs_vision=task is not None and task.needs_vision,
-            vision_failure=self._eyes.failure,
-            task_failure=self._task_failure,
-            refusal=self._refusal,
-            internal_error=self._internal_error,
-            is_interrupted=self._is_interrupted,
+        task, detour = self._task, self._detour
+        # While holding, the paused task's needs count; a search and a rejoining have their own.
+        needing = detour.task if detour is not None and self._machine.state != m.HOLDING else task
+        started_ns = self._task_started_ns if detour is None else now_ns
+        if self._machine.state == m.REJOINING:
+            limit_s, started_ns = REJOINING_LIMIT_S, self._task_started_ns
+        elif index is None:
+            limit_s = GOING_DOWN_LIMIT_S
+        else:
+            limit_s = self._plan.tasks[index].time_limit_s
+        return TaskView(
+            age_s=(now_ns - started_ns) / NS_PER_S,
+            limit_s=limit_s,
+            needs_line=needing is not None and needing.needs_line,
+            needs_vision=needing is not None and needing.needs_vision,
+            is_going_down=isinstance(task, GoDownTask) and detour is None,
+            failure=self._situation.troubles.task_failure,
         )
 
-    async def _go_down(self, hazard: Hazard, reaction: Reaction) -> None:
-        """End the mission early: hold for a moment, then land or return."""
+    async def _go_down(self, hazard: Hazard, wanted: Reaction, reaction: Reaction) -> None:
+        """End the mission early: hold for a moment, then land or return; `wanted` is the reaction unresolved."""
         await self._machine.trigger_named("go_down")
-        self._refusal = self._task_failure = self._internal_error = None
+        self._situation.troubles = Troubles()
+        self._detour = None
         self._task_started_ns = self._clock.now_ns()
         if not self.may_have_armed:
             await self._machine.trigger_named(_TRIGGERS[self._end[0]])
@@ -288,9 +409,9 @@ class Executive:
         command = Command.LAND if reaction is Reaction.LAND else Command.RETURN
         task = self._task
         is_healthy = hazard not in (Hazard.INTERNAL_ERROR, Hazard.TASK_TIMED_OUT)
-        if isinstance(task, GoDownTask) and is_healthy and task.command in (command, Command.LAND):
+        if isinstance(task, GoDownTask) and is_healthy and (wanted is Reaction.LAND_CLEAR or task.command is command):
             return  # it is on that way already
-        self._task = GoDownTask(command, PAUSE_BEFORE_GOING_DOWN_S)
+        self._task = GoDownTask(command, self._situation.memory, PAUSE_BEFORE_GOING_DOWN_S)
         try:
             await self._helm.hold()
         except AutopilotError as error:  # then the way down is all the more urgent, and goes on
@@ -298,21 +419,26 @@ class Executive:
 
     # -- what others hear ----------------------------------------------------------------------------------------
 
-    def _from_start_m(self, state: VehicleState) -> float:
-        start = self._memory.start
-        return math.hypot(state.north_m - start.north_m, state.east_m - start.east_m)
+    def _altitude_m(self) -> float:
+        state = self._autopilot.state
+        return 0.0 if state is None else self._situation.height_m(state)
 
     def _show(self, state: VehicleState) -> None:
-        height_m = self._memory.start.down_m - state.down_m
+        situation = self._situation
         self.progress = Progress(
-            self._machine.state, self._machine.task_index, height_m, self._from_start_m(state), state.yaw_rad
+            self._machine.state,
+            self._machine.task_index,
+            situation.height_m(state),
+            situation.from_start_m(state),
+            state.yaw_rad,
         )
 
-    def _keep_status_texts(self) -> None:
-        for text in self._autopilot.drain_status_texts():
-            self._log.record_status_text(self._clock.now_ns(), text)
+    async def _before_change(self, source: str, target: str) -> None:
+        """The journal has it before it happens."""
+        progress = 0.0 if self._task is None else self._task.progress
+        await self._crew.logbook.transition(source, target, self._machine.task_index, progress, self._autopilot.state)
 
-    def _on_change(self, state: str) -> None:
+    def _after_change(self, state: str) -> None:
         before = self.progress
         self.progress = Progress(
             state, self._machine.task_index, before.height_m, before.distance_m, before.heading_rad

@@ -35,6 +35,11 @@ class Eyes(Protocol):
         """What a flight would still have to wait for; None where the eyes see."""
         ...
 
+    @property
+    def impairment(self) -> Notice | None:
+        """What keeps the eyes from seeing at the moment: camera_gone or camera_blind; None while they see."""
+        ...
+
     def take(self) -> list[VisionReport]:
         """The reports since the last call, oldest first."""
         ...
@@ -114,6 +119,7 @@ def _interpolate(earlier: VehicleState, later: VehicleState, t_ns: int) -> Vehic
         landed=later.landed,
         battery=later.battery,
         is_connected=later.is_connected,
+        is_failsafe=later.is_failsafe,
         is_position_ok=later.is_position_ok,
     )
 
@@ -145,7 +151,10 @@ def sight_of(
 
 
 class Lookout:
-    """Keeps what is needed to make a sight of each report. `line_seen_ns` is when the newest line was seen."""
+    """Keeps what is needed to make a sight of each report.
+
+    `sight_ns` is when the newest frame that can be looked at was taken, `line_seen_ns` when the newest line was seen.
+    """
 
     def __init__(self, eyes: Eyes, log: FlightLog, camera: Intrinsics, guidance: GuidanceSettings) -> None:
         self._eyes = eyes
@@ -154,7 +163,13 @@ class Lookout:
         self._guidance = guidance
         self._history = StateHistory()
         self._group = GroupSize()
+        self.sight_ns = 0
         self.line_seen_ns = 0
+
+    def expect(self, now_ns: int) -> None:
+        """Something that needs eyes begins now: both times are at least this one."""
+        self.sight_ns = max(self.sight_ns, now_ns)
+        self.line_seen_ns = max(self.line_seen_ns, now_ns)
 
     def look(self, now_ns: int, state: VehicleState) -> Sight | None:
         """The newest report since the last look, on the map; the older ones are kept in the log alone."""
@@ -166,8 +181,10 @@ class Lookout:
         if not reports:
             return None
         sight = sight_of(reports[-1], self._history, self._group, self._camera, self._guidance, now_ns)
-        if sight is not None and sight.line is not None:
-            self.line_seen_ns = max(self.line_seen_ns, sight.t_capture_ns)
+        if sight is not None:
+            self.sight_ns = max(self.sight_ns, sight.t_capture_ns)
+            if sight.line is not None:
+                self.line_seen_ns = max(self.line_seen_ns, sight.t_capture_ns)
         return sight
 
     def keep_notices(self, now_ns: int) -> None:

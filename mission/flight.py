@@ -4,7 +4,6 @@ import asyncio
 import contextlib
 import functools
 import json
-import shutil
 import signal
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
@@ -17,12 +16,19 @@ from mission.autopilot import VehicleState
 from mission.autopilot_mavsdk import MavsdkAutopilot
 from mission.build import vision_settings
 from mission.checks import Check
-from mission.executive import Executive
+from mission.executive import Crew, Executive
+from mission.guard import Guard
+from mission.journal import SUFFIX, DiskJournal
 from mission.log.disk import log_path
+from mission.log.errors import LogError
 from mission.log.recorder import Recorder
+from mission.logbook import FlightPapers, Logbook
+from mission.plan import MissionPlan
 from mission.plan_file import MissionFile
 from mission.records import MissionEnded, TrueLine, TruePose
 from mission.reporting import Progress
+from mission.resumption import Resumption
+from mission.surroundings import Surroundings, Watched
 from mission.worker_eyes import WorkerEyes
 from vision.worker import VisionWorker
 
@@ -39,7 +45,8 @@ class FlightSetup:
     """What a flight is made of. `open_camera` is called in the vision worker.
 
     `true_line` and `true_pose` are known for a simulated vehicle alone; `feed_pose` gets the telemetry where a camera
-    is simulated for a vehicle that flies elsewhere.
+    is simulated for a vehicle that flies elsewhere. `remaining` is what is left of a mission that is resumed, and
+    `resumption` where.
     """
 
     mission: MissionFile
@@ -51,6 +58,13 @@ class FlightSetup:
     true_line: TrueLine | None = None
     true_pose: Callable[[], TruePose | None] | None = None
     feed_pose: Callable[[VehicleState], None] | None = None
+    remaining: MissionPlan | None = None
+    resumption: Resumption | None = None
+
+    @property
+    def plan(self) -> MissionPlan:
+        """What is flown: the mission, or what is left of it."""
+        return self.mission.plan if self.remaining is None else self.remaining
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,17 +87,21 @@ async def fly(
 
     `on_progress` hears a few times a second where the flight stands, `on_checks` once what pre-flight found.
 
-    Raises LogError when the log cannot be made; then nothing was connected.
+    Raises LogError when log or journal cannot be made, and GuardError; then nothing was connected.
     """
-    plan, clock = setup.mission.plan, setup.clock
+    plan, clock = setup.plan, setup.clock
     path = log_path(setup.log_folder, plan.name, datetime.now(UTC))
-    with Recorder(
-        path,
-        mission_text=setup.mission.text,
-        mission_name=plan.name,
-        metadata=setup.metadata | _camera_words(setup.mission.camera),
-        clock=clock,
-    ) as recorder:
+    with (
+        Guard() as guard,
+        Recorder(
+            path,
+            mission_text=setup.mission.text,
+            mission_name=plan.name,
+            metadata=setup.metadata | _camera_words(setup.mission.camera),
+            clock=clock,
+        ) as recorder,
+    ):
+        journal = _open_journal(path.with_suffix(SUFFIX))
         camera = setup.mission.camera
         make_worker = functools.partial(
             VisionWorker, setup.open_camera, vision_settings(plan.vision, camera), clock, plan.vision.log_rate_hz
@@ -92,14 +110,28 @@ async def fly(
         autopilot = MavsdkAutopilot(
             setup.connection, clock, lambda text: recorder.record_status_text(clock.now_ns(), f"mavsdk {text}")
         )
-        executive = Executive(
-            plan, autopilot, eyes, recorder, clock, camera, functools.partial(_free_bytes, path.parent), on_checks
+        surroundings = Surroundings(
+            Watched(
+                path.parent,
+                setup.mission.path,
+                setup.mission.sha256,
+                lambda: recorder.failure,
+                lambda: journal.failure,
+                lambda: guard.failure,
+            )
         )
+        logbook = Logbook(journal, _papers(setup, path))
+        crew = Crew(autopilot, eyes, camera, recorder, logbook, surroundings.view)
+        executive = Executive(plan, crew, clock, setup.resumption, on_checks)
         if setup.true_line is not None:
             recorder.record(setup.true_line)
         eyes.start()
         with _stop_signals(executive.request_stop):
-            sides = [asyncio.create_task(_every(_PROGRESS_RATE_HZ, 1.0, lambda: on_progress(executive.progress)))]
+            sides = [
+                asyncio.create_task(guard.beat(lambda: executive.tick_s)),
+                asyncio.create_task(surroundings.watch()),
+                asyncio.create_task(_every(_PROGRESS_RATE_HZ, 1.0, lambda: on_progress(executive.progress))),
+            ]
             if setup.true_pose is not None:
                 sides.append(asyncio.create_task(_record_truth(setup.true_pose, recorder, clock)))
             if setup.feed_pose is not None:
@@ -112,15 +144,28 @@ async def fly(
                 await asyncio.gather(*sides, return_exceptions=True)
                 await autopilot.close()
                 eyes.stop()
+                await journal.close()
         on_progress(executive.progress)
     return FlightOutcome(ended, executive.may_have_armed, path, recorder.failure)
 
 
-def _free_bytes(folder: Path) -> int | None:
+def _open_journal(path: Path) -> DiskJournal:
     try:
-        return shutil.disk_usage(folder).free
-    except OSError:
-        return None
+        return DiskJournal(path)
+    except OSError as error:
+        raise LogError(f"The journal {path} cannot be made ({error.strerror}); name a folder to write to.") from None
+
+
+def _papers(setup: FlightSetup, log: Path) -> FlightPapers:
+    mission = setup.mission
+    return FlightPapers(
+        mission=setup.plan.name,
+        mission_path=str(mission.path.resolve()),
+        mission_sha256=mission.sha256,
+        connection=setup.connection,
+        camera=setup.metadata.get("camera", setup.metadata["command"]),
+        log=str(log),
+    )
 
 
 def _camera_words(camera: Intrinsics) -> dict[str, str]:

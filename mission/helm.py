@@ -5,29 +5,40 @@ from collections.abc import Awaitable
 from drivers.clock import Clock
 from mission.autopilot import Autopilot, AutopilotError, FlightMode, NoAnswerError, Setpoint, VehicleState
 from mission.guidance import leash
+from mission.limits import LOWEST_M, SetpointLimits, unsafe
 from mission.mode_watch import ModeWatch
 from mission.preflight import not_at_rest
 from mission.reporting import FlightLog
 from mission.tasks.task import Command, Step
+from mission.watchers import TargetWatch
 
 MAX_MISSED_SETPOINTS = 2
 """In a row; each takes its time limit of half a second."""
 
 
+class UnsafeSetpointError(Exception):
+    """A task wanted a setpoint that must not be sent; the message is a sentence."""
+
+
 class Helm:
     """Sends setpoints and commands. `reference` is the last setpoint, `modes` what our commands explain.
 
-    Its coroutines raise AutopilotError when the autopilot refuses or does not answer.
+    Its coroutines raise AutopilotError when the autopilot refuses or does not answer, and UnsafeSetpointError.
     """
 
-    def __init__(self, autopilot: Autopilot, log: FlightLog, clock: Clock, leash_m: float) -> None:
+    def __init__(self, autopilot: Autopilot, log: FlightLog, clock: Clock, limits: SetpointLimits) -> None:
         self._autopilot = autopilot
         self._log = log
         self._clock = clock
-        self._leash_m = leash_m
+        self._limits = limits
         self._n_missed_setpoints = 0
         self.reference = Setpoint(0.0, 0.0, 0.0, 0.0)
+        self.start = self.reference
+        """The take-off point."""
+        self.floor_m = LOWEST_M
+        """What setpoints must stay above, from the take-off point."""
         self.modes = ModeWatch()
+        self.targets = TargetWatch()
         self.was_told_to_arm = False
         """Whether the vehicle was told to arm and did not refuse."""
 
@@ -54,13 +65,19 @@ class Helm:
     async def _steer(self, setpoint: Setpoint, state: VehicleState) -> None:
         """Send a setpoint on its leash; the first of an offboard phase is where the vehicle is."""
         if self.modes.is_offboard:
-            self.reference = leash(setpoint, state, self._leash_m)
+            wanted = leash(setpoint, state, self._limits.leash_m)
+            words = unsafe(wanted, self.start, self.floor_m, self._limits)
+            if words is not None:
+                raise UnsafeSetpointError(words)
+            self.reference = wanted
             await self._send_setpoint()
         else:
             # Entering offboard must not move the vehicle.
             self.reference = Setpoint(state.north_m, state.east_m, state.down_m, self.reference.yaw_rad)
             await self._command(self._autopilot.start_offboard(self.reference), FlightMode.OFFBOARD)
-        self._log.record_setpoint(self._clock.now_ns(), self.reference)
+        now_ns = self._clock.now_ns()
+        self.targets.sent(now_ns, self.reference)
+        self._log.record_setpoint(now_ns, self.reference)
 
     async def _send_setpoint(self) -> None:
         """Send the reference; one that is not taken in time may be missed, as the one before it is repeated."""

@@ -13,7 +13,7 @@ Edge = tuple[str, str, str]
 
 def draw_mission(plan: MissionPlan) -> str:
     """Draw the state machine that flies a mission."""
-    return mermaid(FlightMachine([task.task for task in plan.tasks], lambda state: None))
+    return mermaid(FlightMachine([task.task for task in plan.tasks]))
 
 
 def mermaid(machine: FlightMachine) -> str:

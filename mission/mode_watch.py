@@ -1,5 +1,7 @@
 """Which flight modes our own commands explain; any other mode is somebody else's doing."""
 
+from dataclasses import dataclass
+
 from drivers.clock import NS_PER_S
 from mission.autopilot import FlightMode, LandedState, VehicleState
 
@@ -13,6 +15,18 @@ pilot who was quicker than the heartbeat, look the same from here, and the pilot
 _ANY = frozenset(FlightMode)
 
 
+@dataclass(frozen=True, slots=True)
+class ModeView:
+    """What our commands say about flight modes: `explained` are ours; `is_offboard`: offboard was commanded last.
+
+    `was_offboard` says that the autopilot was in offboard since.
+    """
+
+    explained: frozenset[FlightMode]
+    is_offboard: bool
+    was_offboard: bool
+
+
 class ModeWatch:
     """Remembers what was commanded and when. Before the first command any mode is explained.
 
@@ -23,6 +37,7 @@ class ModeWatch:
     def __init__(self) -> None:
         self._modes = _ANY
         self._wanted = _ANY
+        self._was_offboard = False
         self._fading: list[tuple[int, frozenset[FlightMode]]] = []  # (when it was replaced [ns], modes)
 
     @property
@@ -37,7 +52,15 @@ class ModeWatch:
     def accept(self, now_ns: int, *modes: FlightMode) -> None:
         """The autopilot has accepted a command that leads to one of `modes`."""
         self._fading.append((now_ns, self._modes))
+        if self._wanted != frozenset(modes):
+            self._was_offboard = False
         self._modes = self._wanted = frozenset(modes)
+
+    def view(self, now_ns: int, state: VehicleState) -> ModeView:
+        """What our commands say about the modes now."""
+        if self.is_offboard and state.mode is FlightMode.OFFBOARD:
+            self._was_offboard = True
+        return ModeView(self.explained(now_ns, state), self.is_offboard, self._was_offboard)
 
     def explained(self, now_ns: int, state: VehicleState) -> frozenset[FlightMode]:
         """The modes that are explained now.

@@ -213,23 +213,49 @@ class GuidancePlan(_Section):
 
 
 WayDown = Literal["land_clear", "return", "land"]
+Pause = Literal["hold", "climb_and_hold"]
 
 
 class Reactions(_Section):
     """What to do about each hazard.
 
-    return: the autopilot's return mode, which lands at the take-off point. land: land right here. land_clear: land
-    here, but return when the line may be below. continue: note it and go on.
+    hold: stay on the spot until it is over, for hold_limit_s at most. climb_and_hold: the same, higher up. search: see
+    line_search. return: the autopilot's return mode, which lands at the take-off point. land: land right here.
+    land_clear: land here, but return when the line may be below. continue: note it and go on.
     """
 
     interrupted: WayDown = Field("land_clear", description="Ctrl-C or SIGTERM: hold, then this.")
-    line_lost: Literal[WayDown, "continue"] = "return"
-    vision_dead: WayDown = "return"
+    line_lost: Literal[WayDown, Pause, "search", "continue"] = "search"
+    vision_dead: Literal[WayDown, Pause] = "return"
+    camera_gone: Literal[WayDown, Pause, "continue"] = "hold"
+    camera_blind: Literal[WayDown, Pause, "continue"] = Field("hold", description="Dark, frozen or unreadable frames.")
+    estimate_stale: Literal[WayDown, Pause, "continue"] = "hold"
     task_timed_out: WayDown = "return"
     task_failed: WayDown = Field("return", description="For example: move_until found no line.")
     geofence: WayDown = "return"
     battery_low: Literal[WayDown, "continue"] = "return"
     battery_critical: WayDown = "land_clear"
+    position_bad: Literal[WayDown, Pause] = Field("hold", description="The autopilot's own failsafe follows.")
+    tracking_error: Literal[WayDown, Pause, "continue"] = Field(
+        "return", description="The vehicle does not follow its setpoints, or tilts too far: too much wind."
+    )
+    guard_dead: Literal[WayDown, "continue"] = Field("return", description="Nothing watches the control loop any more.")
+    cpu_overload: Literal[WayDown, Pause, "continue"] = "return"
+    tick_late: Literal[WayDown, Pause, "continue"] = "continue"
+    disk_full: Literal[WayDown, "continue"] = "continue"
+    log_failing: Literal[WayDown, "continue"] = "continue"
+    mission_changed: Literal[WayDown, "continue"] = Field(
+        "continue", description="The file on disk is another than the one that is flown."
+    )
+
+
+class LineSearchPlan(_Section):
+    """How a lost line is searched for: hold, climb, sweep in yaw, go back along the flown way, sweep again."""
+
+    climb_m: float = Field(3.0, ge=0, le=20, description="Also for climb_and_hold; never above the fence.")
+    sweep_deg: float = Field(40.0, ge=0, le=90, description="Turn so far to both sides.")
+    back_m: float = Field(20.0, ge=0, le=200, description="At most so far back to where the line was last seen.")
+    n_detections: int = Field(4, ge=1, le=100, description="Frames in a row that find the line again.")
 
 
 class SafetyPlan(_Section):
@@ -245,7 +271,12 @@ class SafetyPlan(_Section):
     line_lost_s: float = Field(
         3.0, gt=0, le=60, description="No estimate for so long while following: the line is lost."
     )
+    line_search: LineSearchPlan = LineSearchPlan()
+    estimate_stale_s: float = Field(1.0, gt=0, le=10, description="No frame through vision for so long.")
     telemetry_stale_s: float = Field(1.5, gt=0, le=10)
+    position_bad_s: float = Field(1.5, gt=0, le=10, description="No good position for so long.")
+    hold_limit_s: float = Field(20.0, gt=0, le=600, description="A pause that lasts longer ends in land_clear.")
+    min_disk_mb: float = Field(200.0, ge=0, le=1e6, description="Less space than this for the log is a hazard.")
     battery_low_percent: float = Field(25.0, ge=5, le=90)
     battery_critical_percent: float = Field(12.0, ge=2, le=90)
     reactions: Reactions = Reactions()

@@ -1,6 +1,7 @@
 """Reading a mission file: a MissionPlan, or every error at once with file, line and key."""
 
 import difflib
+import hashlib
 import json
 from dataclasses import dataclass
 from pathlib import Path
@@ -48,6 +49,11 @@ class MissionFile:
     text: str
     plan: MissionPlan
     camera: Intrinsics
+
+    @property
+    def sha256(self) -> str:
+        """The hex digest of its text as UTF-8."""
+        return hashlib.sha256(self.text.encode()).hexdigest()
 
 
 def read_mission(path: Path) -> MissionFile:

@@ -4,6 +4,7 @@ import asyncio
 import time
 from collections import deque
 from collections.abc import Callable, Mapping
+from dataclasses import dataclass
 
 from drivers.clock import NS_PER_S, Clock
 from mission.autopilot import Autopilot, AutopilotError, AutopilotKind, Identity
@@ -23,6 +24,19 @@ _FINAL_AFTER_S = 1.0
 
 _FRAMES_WINDOW = 30
 _MIN_FRAMES = 3
+
+
+@dataclass(frozen=True, slots=True)
+class Readiness:
+    """What the checks found, and who flies the vehicle (None: it did not say)."""
+
+    checks: list[Check]
+    identity: Identity | None
+
+    @property
+    def failures(self) -> list[str]:
+        """What keeps the vehicle on the ground, in sentences; empty when it may be armed."""
+        return [check.line for check in self.checks if check.result is CheckResult.FAILED]
 
 
 class _Answers:
@@ -76,12 +90,15 @@ async def wait_until_ready(
     free_bytes: Callable[[], int | None],
     is_stopped: Callable[[], bool],
     tell: Callable[[tuple[str, ...]], None],
-) -> list[Check]:
+    *,
+    may_fly: bool = False,
+) -> Readiness:
     """Connect, wait, and return what every check found; the vehicle may be armed when none of them has failed.
 
     Waits for what may still come, at most vehicle.ready_time_limit_s [s, wall]: compiling and connecting take wall
     time, however fast the flight's clock runs. Returns early when `is_stopped`, and when a check has failed for good.
-    `free_bytes` tells the room that the log has; `tell` hears what is being waited for.
+    `free_bytes` tells the room that the log has; `tell` hears what is being waited for. A mission that is resumed
+    `may_fly` already.
     """
     loop = asyncio.get_running_loop()
     limit_s = loop.time() + plan.vehicle.ready_time_limit_s
@@ -91,7 +108,7 @@ async def wait_until_ready(
     try:
         while True:
             frames.add(eyes.take())
-            checks = check_all(_facts(autopilot, eyes, answers, frames, free_bytes()), plan)
+            checks = check_all(_facts(autopilot, eyes, answers, frames, free_bytes(), may_fly=may_fly), plan)
             tell(tuple(dict.fromkeys(check.waits_for for check in checks if check.waits_for)))
             now_s = loop.time()
             has_failed = any(check.result is CheckResult.FAILED for check in checks)
@@ -99,7 +116,7 @@ async def wait_until_ready(
             final_since_s = None if not is_final else now_s if final_since_s is None else final_since_s
             is_over = final_since_s is not None and now_s - final_since_s >= _FINAL_AFTER_S
             if not has_failed or is_over or is_stopped() or now_s > limit_s:
-                return checks
+                return Readiness(checks, answers.identity)
             if asking.done():
                 asking.result()  # a bug in there is ours to hear of
             await asyncio.sleep(clock.wall_s(_POLL_S))
@@ -108,7 +125,15 @@ async def wait_until_ready(
         await asyncio.gather(asking, return_exceptions=True)
 
 
-def _facts(autopilot: Autopilot, eyes: Eyes, answers: _Answers, frames: _FrameRate, free_bytes: int | None) -> Facts:
+def _facts(
+    autopilot: Autopilot,
+    eyes: Eyes,
+    answers: _Answers,
+    frames: _FrameRate,
+    free_bytes: int | None,
+    *,
+    may_fly: bool,
+) -> Facts:
     return Facts(
         is_linked=answers.is_linked,
         link_failure=answers.failure,
@@ -121,4 +146,5 @@ def _facts(autopilot: Autopilot, eyes: Eyes, answers: _Answers, frames: _FrameRa
         frames_hz=frames.hz,
         free_bytes=free_bytes,
         unix_s=time.time(),
+        may_fly=may_fly,
     )

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
-from mission.autopilot import AutopilotKind, Identity, LandedState, VehicleState
+from mission.autopilot import AutopilotKind, FlightMode, Identity, LandedState, VehicleState
 from mission.checks import Check, failed, passed, waiting, warning
 from mission.estimate import FlightTotals, total
 from mission.offline_checks import check_offline
@@ -28,7 +28,7 @@ class Facts:
     """What is known before arming; None is not known yet, or not to be had.
 
     `link_failure` is why no link comes about (a sentence), `frames_hz` the camera's rate in flight time, `free_bytes`
-    what the log's disk has, `unix_s` the computer's clock.
+    what the log's disk has, `unix_s` the computer's clock. A mission that is resumed `may_fly` already.
     """
 
     is_linked: bool
@@ -42,6 +42,12 @@ class Facts:
     frames_hz: float | None
     free_bytes: int | None
     unix_s: float | None
+    may_fly: bool = False
+
+    @property
+    def is_handed_over(self) -> bool:
+        """Whether a pilot has left the flying vehicle to a mission that is resumed."""
+        return self.may_fly and self.state is not None and is_handed_over(self.state)
 
 
 def check_all(facts: Facts, plan: MissionPlan) -> list[Check]:
@@ -51,8 +57,8 @@ def check_all(facts: Facts, plan: MissionPlan) -> list[Check]:
     if facts.is_linked:
         vehicle += [
             _autopilot(facts.identity),
-            _vehicle(facts.state),
-            _health(facts.missing_health),
+            _vehicle(facts),
+            _health(facts),
             _home(facts.missing_health),
             _battery(facts.state, plan, totals),
             *_parameters(facts, plan, totals),
@@ -77,6 +83,11 @@ def not_at_rest(state: VehicleState) -> str | None:
     if state.landed is not LandedState.ON_GROUND:
         return "the vehicle to stand on the ground"
     return None
+
+
+def is_handed_over(state: VehicleState) -> bool:
+    """Whether a pilot has left a flying vehicle hovering in hold mode, from where a mission may be resumed."""
+    return state.is_armed and state.landed is LandedState.IN_AIR and state.mode is FlightMode.HOLD
 
 
 def _link(facts: Facts) -> Check:
@@ -111,13 +122,20 @@ def _version(text: str) -> tuple[int, ...]:
     return tuple(int(part) for part in text.split(".") if part.isdigit())
 
 
-def _vehicle(state: VehicleState | None) -> Check:
-    rest = "telemetry" if state is None else not_at_rest(state)
-    return passed("vehicle", "it stands disarmed on the ground") if rest is None else waiting("vehicle", rest)
+def _vehicle(facts: Facts) -> Check:
+    if facts.is_handed_over:
+        return passed("vehicle", "it hovers in hold mode")
+    rest = "telemetry" if facts.state is None else not_at_rest(facts.state)
+    if rest is None:
+        return passed("vehicle", "it stands disarmed on the ground")
+    return waiting("vehicle", f"{rest}, or to hover in hold mode" if facts.may_fly else rest)
 
 
-def _health(missing: tuple[str, ...]) -> Check:
-    others = [words for words in missing if words != _HOME]
+def _health(facts: Facts) -> Check:
+    if facts.is_handed_over:  # what it needs for arming does not matter any more; its position does
+        is_ok = facts.state is not None and facts.state.is_position_ok
+        return passed("health", "it knows where it is") if is_ok else waiting("health", "a good position")
+    others = [words for words in facts.missing_health if words != _HOME]
     return waiting("health", ", ".join(others)) if others else passed("health", "the autopilot would arm")
 
 

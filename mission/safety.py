@@ -1,148 +1,91 @@
-"""Safety: from what is observed to events, and from events to the one reaction that counts. Pure functions.
+"""Safety: the hazards in the order of their urgency, the reactions, and which one counts. Pure.
 
-docs/safety.md explains the table. A takeover by the pilot outranks everything and is never fought.
+docs/safety.md explains the table. A takeover by the pilot outranks everything and is never fought. mission.hazards says
+when a hazard stands.
 """
 
 import enum
-import math
 from collections.abc import Mapping
-from dataclasses import dataclass
-
-from drivers.clock import NS_PER_S
-from mission.autopilot import FlightMode, VehicleState
 
 
 class Reaction(enum.StrEnum):
-    """What the executive does about an event, mildest first."""
+    """What the executive does about a hazard, mildest first.
+
+    HOLD, CLIMB_AND_HOLD and SEARCH are pauses: the task goes on once the hazard is over. RETURN, LAND_CLEAR and LAND
+    end the mission.
+    """
 
     CONTINUE = "continue"
+    HOLD = "hold"
+    CLIMB_AND_HOLD = "climb_and_hold"
+    SEARCH = "search"
     RETURN = "return"
     LAND_CLEAR = "land_clear"
     LAND = "land"
     GIVE_UP_CONTROL = "give_up_control"
 
 
+PAUSES = (Reaction.HOLD, Reaction.CLIMB_AND_HOLD, Reaction.SEARCH)
+
+
 class Hazard(enum.StrEnum):
-    """Everything that safety watches for."""
+    """Everything that safety watches for, the most urgent first."""
 
     TAKEOVER = "takeover"
+    AUTOPILOT_FAILSAFE = "autopilot_failsafe"
+    OFFBOARD_REFUSED = "offboard_refused"
     DISARMED = "disarmed"
     LINK_LOST = "link_lost"
     TELEMETRY_STALE = "telemetry_stale"
+    SECOND_CONTROLLER = "second_controller"
     COMMAND_REFUSED = "command_refused"
     INTERNAL_ERROR = "internal_error"
+    SETPOINT_UNSAFE = "setpoint_unsafe"
     BATTERY_CRITICAL = "battery_critical"
+    POSITION_BAD = "position_bad"
     INTERRUPTED = "interrupted"
     GEOFENCE = "geofence"
+    TRACKING_ERROR = "tracking_error"
+    GUARD_DEAD = "guard_dead"
+    CPU_OVERLOAD = "cpu_overload"
     VISION_DEAD = "vision_dead"
     TASK_TIMED_OUT = "task_timed_out"
     TASK_FAILED = "task_failed"
     BATTERY_LOW = "battery_low"
+    CAMERA_GONE = "camera_gone"
+    CAMERA_BLIND = "camera_blind"
+    ESTIMATE_STALE = "estimate_stale"
     LINE_LOST = "line_lost"
+    TICK_LATE = "tick_late"
+    DISK_FULL = "disk_full"
+    LOG_FAILING = "log_failing"
+    MISSION_CHANGED = "mission_changed"
 
 
 PRIORITY: tuple[Hazard, ...] = tuple(Hazard)
-"""The most urgent first: when several hazards stand at once, the first of this order decides."""
+"""When several hazards stand at once, the first of this order decides."""
 
 FIXED_REACTIONS: Mapping[Hazard, Reaction] = {
-    # The pilot has the vehicle.
+    # The pilot has the vehicle, or the autopilot's own failsafe: who takes it back fights them.
     Hazard.TAKEOVER: Reaction.GIVE_UP_CONTROL,
+    Hazard.AUTOPILOT_FAILSAFE: Reaction.GIVE_UP_CONTROL,
+    # It said yes and stayed where it was: from here that looks like a pilot who was quicker.
+    Hazard.OFFBOARD_REFUSED: Reaction.GIVE_UP_CONTROL,
     # A kill switch, or the autopilot: whoever arms again must not meet our setpoints.
     Hazard.DISARMED: Reaction.GIVE_UP_CONTROL,
     # Nothing we send arrives, or nothing tells us what it does: the autopilot's own failsafe acts when we fall silent.
     Hazard.LINK_LOST: Reaction.GIVE_UP_CONTROL,
     Hazard.TELEMETRY_STALE: Reaction.GIVE_UP_CONTROL,
+    # Outside offboard nobody's setpoints count, and the vehicle comes home by itself.
+    Hazard.SECOND_CONTROLLER: Reaction.LAND_CLEAR,
     # The autopilot or we cannot do what the mission needs, but the vehicle still obeys the simplest commands.
     Hazard.COMMAND_REFUSED: Reaction.LAND_CLEAR,
     Hazard.INTERNAL_ERROR: Reaction.LAND_CLEAR,
+    Hazard.SETPOINT_UNSAFE: Reaction.LAND_CLEAR,
 }
 """The reactions that no mission file can change; the others stand in the plan's safety.reactions."""
 
-
-@dataclass(frozen=True, slots=True)
-class SafetyLimits:
-    """The limits that the observation is held against; distances from the take-off point, battery 0 to 1."""
-
-    max_distance_m: float
-    max_altitude_m: float
-    line_lost_s: float
-    telemetry_stale_s: float
-    battery_low: float
-    battery_critical: float
-
-
-@dataclass(frozen=True, slots=True)
-class SafetyInput:
-    """What safety looks at in one tick. Distances are from the take-off point, times are flight time.
-
-    `allowed_modes` are the flight modes that our own last command explains, and `is_going_down` says that it was to
-    land or to return; `was_armed` that the vehicle was seen armed in this flight. `needs_line` is true for tasks that
-    steer by the line, and `line_seen_ns` is the capture time of the newest estimate, or the task's start before the
-    first. `task_failure`, `refusal` (of a command, by the autopilot) and `internal_error` are sentences, None where all
-    is well.
-    """
-
-    now_ns: int
-    state: VehicleState
-    allowed_modes: frozenset[FlightMode]
-    distance_m: float
-    altitude_m: float
-    was_armed: bool
-    is_going_down: bool
-    task_age_s: float
-    task_limit_s: float
-    needs_line: bool
-    line_seen_ns: int
-    needs_vision: bool
-    vision_failure: str | None
-    task_failure: str | None
-    refusal: str | None
-    internal_error: str | None
-    is_interrupted: bool
-
-
-def find_hazards(seen: SafetyInput, limits: SafetyLimits) -> dict[Hazard, str]:
-    """Every hazard that stands now, most urgent first, each with a sentence for a person."""
-    state = seen.state
-    age_s = (seen.now_ns - state.t_ns) / NS_PER_S
-    unseen_s = (seen.now_ns - seen.line_seen_ns) / NS_PER_S
-    battery = math.inf if state.battery is None else state.battery
-    found: dict[Hazard, str] = {}
-    if state.mode not in seen.allowed_modes:
-        found[Hazard.TAKEOVER] = f"the vehicle is in {state.mode} mode, which our last command does not explain"
-    if seen.was_armed and not state.is_armed and not seen.is_going_down:
-        found[Hazard.DISARMED] = "the vehicle was disarmed in mid-mission"
-    if not state.is_connected:
-        found[Hazard.LINK_LOST] = "the autopilot's heartbeat is missing"
-    elif age_s > limits.telemetry_stale_s:
-        found[Hazard.TELEMETRY_STALE] = f"the newest position is {age_s:.1f} s old"
-    if seen.refusal is not None:
-        found[Hazard.COMMAND_REFUSED] = seen.refusal
-    if seen.internal_error is not None:
-        found[Hazard.INTERNAL_ERROR] = seen.internal_error
-    if battery <= limits.battery_critical:
-        found[Hazard.BATTERY_CRITICAL] = f"the battery is at {battery:.0%}"
-    if seen.is_interrupted:
-        found[Hazard.INTERRUPTED] = "the operator asked to stop"
-    if seen.is_going_down:
-        pass  # the autopilot chooses its own way home, and RTL_RETURN_ALT may lie above the fence
-    elif seen.distance_m > limits.max_distance_m:
-        found[Hazard.GEOFENCE] = (
-            f"{seen.distance_m:.0f} m from the take-off point, allowed are {limits.max_distance_m:g} m"
-        )
-    elif seen.altitude_m > limits.max_altitude_m:
-        found[Hazard.GEOFENCE] = f"{seen.altitude_m:.0f} m high, allowed are {limits.max_altitude_m:g} m"
-    if seen.needs_vision and seen.vision_failure is not None:
-        found[Hazard.VISION_DEAD] = seen.vision_failure
-    if seen.task_age_s > seen.task_limit_s:
-        found[Hazard.TASK_TIMED_OUT] = f"the task took longer than {seen.task_limit_s:g} s"
-    if seen.task_failure is not None:
-        found[Hazard.TASK_FAILED] = seen.task_failure
-    if limits.battery_critical < battery <= limits.battery_low:
-        found[Hazard.BATTERY_LOW] = f"the battery is at {battery:.0%}"
-    if seen.needs_line and unseen_s > limits.line_lost_s:
-        found[Hazard.LINE_LOST] = f"no line seen for {unseen_s:.1f} s"
-    return {hazard: found[hazard] for hazard in PRIORITY if hazard in found}
+_SILENCE = (Hazard.LINK_LOST, Hazard.TELEMETRY_STALE)
 
 
 def decide(
@@ -150,24 +93,42 @@ def decide(
 ) -> tuple[Hazard, Reaction] | None:
     """The hazard that decides and its reaction; None when nothing has to be done.
 
-    `reactions` are the mission's; FIXED_REACTIONS go before them. A hazard whose reaction is to continue never hides
-    one that asks for more. Outside offboard the autopilot does not miss us: a lost link is then answered by trying to
-    bring the vehicle down.
+    `reactions` are the mission's; FIXED_REACTIONS go before them. A hazard whose reaction is milder never hides one
+    that asks for more: what ends the mission goes before what pauses it, and that before what is only noted. Outside
+    offboard the autopilot does not miss us, so that a lost link is answered by trying to bring the vehicle down; and
+    there nothing is paused, because the autopilot flies its own take-off or landing.
     """
-    for hazard in PRIORITY:
-        if hazard in hazards:
-            reaction = FIXED_REACTIONS[hazard] if hazard in FIXED_REACTIONS else reactions[hazard]
-            if hazard in (Hazard.LINK_LOST, Hazard.TELEMETRY_STALE) and not is_offboard:
-                reaction = Reaction.LAND_CLEAR
-            if reaction is not Reaction.CONTINUE:
-                return hazard, reaction
+    standing = [
+        (hazard, _reaction(hazard, reactions, is_offboard=is_offboard)) for hazard in PRIORITY if hazard in hazards
+    ]
+    for hazard, reaction in standing:
+        if reaction not in (*PAUSES, Reaction.CONTINUE):
+            return hazard, reaction
+    for hazard, reaction in standing:
+        if reaction in PAUSES:
+            return hazard, reaction
     return None
+
+
+def _reaction(hazard: Hazard, reactions: Mapping[Hazard, Reaction], *, is_offboard: bool) -> Reaction:
+    reaction = FIXED_REACTIONS.get(hazard) or reactions[hazard]
+    if is_offboard:
+        return reaction
+    return Reaction.LAND_CLEAR if hazard in _SILENCE or reaction in PAUSES else reaction
+
+
+_MATTERS_ON_THE_WAY_DOWN = (
+    Hazard.TAKEOVER,
+    Hazard.AUTOPILOT_FAILSAFE,
+    Hazard.DISARMED,
+    Hazard.INTERNAL_ERROR,
+    Hazard.TASK_TIMED_OUT,
+)
 
 
 def keep_going_down(hazards: Mapping[Hazard, str]) -> dict[Hazard, str]:
     """The hazards that still matter once the vehicle is on its way down: the others have had their reaction."""
-    matters = (Hazard.TAKEOVER, Hazard.INTERNAL_ERROR, Hazard.TASK_TIMED_OUT)
-    return {hazard: words for hazard, words in hazards.items() if hazard in matters}
+    return {hazard: words for hazard, words in hazards.items() if hazard in _MATTERS_ON_THE_WAY_DOWN}
 
 
 def way_down(reaction: Reaction, *, may_be_over_line: bool) -> Reaction:

@@ -88,6 +88,15 @@ class WorkerEyes:
         is_silent = self._monotonic_s() - self._news_s > self._hang_limit_s
         return "a frame through vision" if is_silent else None
 
+    @property
+    def impairment(self) -> Notice | None:
+        """What keeps the eyes from seeing at the moment; None while they see."""
+        if self._is_camera_gone:
+            return Notice("camera_gone", "the camera gives no frames any more")
+        if self._trouble in BLINDING:
+            return Notice("camera_blind", f"the camera's frames are {self._trouble}")
+        return None
+
     def take(self) -> list[VisionReport]:
         """The reports since the last call, oldest first."""
         self._collect()

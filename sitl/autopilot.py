@@ -8,18 +8,25 @@ from collections import deque
 from dataclasses import replace
 
 from sitl.battery import Battery
-from sitl.commander import Commander, Failsafe, Observation
+from sitl.commander import Commander
 from sitl.control import AttitudeControl, Estimate, PositionControl, Setpoint, attitude_of
 from sitl.estimator import Estimator
+from sitl.failsafes import Failsafe, Observation
 from sitl.flight_tasks import Descend, FlightTask, Hold, Land, Offboard, Return, Takeoff
+from sitl.manual_tasks import AltitudeTask, StickTask
 from sitl.modes import Answer, Landed, Mode, Severity
 from sitl.parameters import Parameters
+from sitl.pilot import Pilot, Sticks
 from sitl.place import Home, Origin
+from sitl.positioning import Positioning
+from sitl.preflight import Preflight
 from sitl.takeoff_landing import LandDetector, Ramp, TakeoffRamp
 from sitl.vehicle import Vector, Vehicle, euler_of
 from sitl.wind import Wind
 
-_HOME_S = 1.2  # after boot: the first home
+_HOME_S = 1.14  # after boot: the first home
+_MIN_SATELLITES = 4  # for a fix
+DEFAULT_UID = 5283920058631409231  # that of every PX4 SITL
 _NAVIGATOR_S = 0.04  # from a mode change to what PX4's navigator says about it
 
 
@@ -39,8 +46,13 @@ class SimAutopilot:
         origin: Origin | None = None,
         speed: float = 1.0,
         is_noisy: bool = True,
+        uid: int = DEFAULT_UID,
     ) -> None:
-        """Boot. `speed` is how many times faster than the wall clock it will be stepped (see Commander)."""
+        """Boot. `speed` is how many times faster than the wall clock it will be stepped (see Commander).
+
+        `uid` is the hardware's number, 64 bits (AUTOPILOT_VERSION): another one is another vehicle.
+        """
+        self.uid = uid
         self.vehicle = vehicle or Vehicle()
         self.wind = wind or Wind(0.0, seed)
         self.parameters = parameters or Parameters()
@@ -67,8 +79,14 @@ class SimAutopilot:
         self._offboard_target: tuple[Vector, float] | None = None
         self._setpoint_s: float | None = None
         self._has_taken_off = False
+        self._took_off_here = False
         self._takeoff_requests = 0
         self._takeoff_altitude_m: float | None = None
+        self._pilot = Pilot(self.parameters)
+        self._stick_mode = self.mode
+        self._preflight = Preflight(self.parameters, self.say)
+        self._positioning = Positioning()
+        self.last_fix_m: Vector = self.estimate.position_m
 
     # --- what a ground station or an application asks ---
 
@@ -92,11 +110,31 @@ class SimAutopilot:
         """The landed state, as EXTENDED_SYS_STATE tells it."""
         if self._land_detector.is_landed:
             return Landed.ON_GROUND
-        if self.mode is Mode.TAKEOFF:
+        if self.mode is Mode.TAKEOFF and self._took_off_here:
             return Landed.TAKEOFF
         if self._task is not None and self._task.is_landing:
             return Landed.LANDING
         return Landed.IN_AIR
+
+    @property
+    def has_gps(self) -> bool:
+        """Whether the receiver has a fix (SIM_GPS_USED satellites, GPS_RAW_INT)."""
+        return self.parameters.get("SIM_GPS_USED") >= _MIN_SATELLITES
+
+    @property
+    def is_position_ok(self) -> bool:
+        """Whether SYS_STATUS tells that the global position is good (the GPS sensor is present)."""
+        return self._positioning.is_reported
+
+    @property
+    def is_position_valid(self) -> bool:
+        """Whether the autopilot itself would still fly by its horizontal position."""
+        return self._positioning.is_valid
+
+    @property
+    def sticks(self) -> Sticks | None:
+        """Where a pilot's sticks stand; None while none come."""
+        return self._pilot.sticks
 
     @property
     def has_seen_setpoints(self) -> bool:
@@ -156,6 +194,13 @@ class SimAutopilot:
         if isinstance(self._task, Offboard):
             self._task.aim(*self._offboard_target)
 
+    def set_sticks(self, pitch: float, roll: float, throttle: float, yaw: float) -> None:
+        """Take a pilot's sticks (MANUAL_CONTROL): pitch forward, roll and yaw right -1 to 1, throttle 0 to 1.
+
+        Centred is 0, but 0.5 for the throttle. They have to come again within COM_RC_LOSS_T, or count as gone.
+        """
+        self._pilot.take(Sticks(pitch, roll, throttle, yaw), self.boot_s)
+
     def set_parameter(self, name: str, value: float | int) -> None:
         """Write a parameter; raises KeyError, TypeError and ValueError as Parameters.set does."""
         self.parameters.set(name, value)
@@ -176,9 +221,15 @@ class SimAutopilot:
         """Let `dt_s` [s] of flight time pass; at most 10 ms for the controllers' sake."""
         self.boot_s += dt_s
         vehicle, commander = self.vehicle, self.commander
+        self._pilot.step(self.boot_s)
+        self._positioning.step(self.boot_s, has_gps=self.has_gps)
+        self._rest_sticks()
         commander.step(self._observation())
+        self._rest_sticks()
         if self._was_armed and not commander.is_armed:
             self._set_home()
+            self._preflight.disarmed(self.boot_s)
+        self._preflight.step(dt_s, self.boot_s, has_gps=self.has_gps, is_armed=commander.is_armed)
         self._was_armed = commander.is_armed
         self._follow_mode()
         self._ramp.step(
@@ -193,10 +244,22 @@ class SimAutopilot:
         self._air_m_s = self.wind.step(dt_s, vehicle.height_m, airspeed_m_s)
         vehicle.step(dt_s, thrust, torque, self._air_m_s)
         self.battery.step(dt_s, vehicle.power_w)
-        self.estimate = self._estimator.step(dt_s, vehicle)
+        drain_s = self.parameters.get("SIM_BAT_DRAIN")
+        if drain_s > 0 and commander.is_armed:
+            least = self.parameters.get("SIM_BAT_MIN_PCT") / 100
+            self.battery.drain(dt_s, empty_after_s=drain_s, least=least)
+        self.estimate = self._estimator.step(dt_s, vehicle, has_gps=self._positioning.has_gps)
+        if self._positioning.has_gps:
+            self.last_fix_m = self.estimate.position_m
         self._detect_landing(dt_s)
-        if self.home is None and self.boot_s >= _HOME_S:
+        if self.home is None and self.boot_s >= _HOME_S and self.has_gps:
             self._set_home()
+
+    def _rest_sticks(self) -> None:
+        """From a change of mode on, a stick counts as moved from where it is then."""
+        if self.mode is not self._stick_mode:
+            self._stick_mode = self.mode
+            self._pilot.rest()
 
     def _control(self, dt_s: float) -> tuple[float, Vector]:
         """Thrust 0 to 1 and torques -1 to 1 of this step."""
@@ -227,7 +290,13 @@ class SimAutopilot:
         if not self.is_armed:
             self._task = self._task_key = None
             return
-        key = (self.mode, self._takeoff_requests if self.mode is Mode.TAKEOFF else 0)
+        takeoff = self._takeoff_requests if self.mode is Mode.TAKEOFF else 0
+        # What else decides between the tasks of a mode.
+        is_steered = self.mode.needs_sticks and self.sticks is not None
+        is_blind = not self.is_position_valid and (self.mode.needs_sticks or self.mode is Mode.LAND)
+        if self.mode is not Mode.TAKEOFF:
+            self._took_off_here = False
+        key = (self.mode, takeoff, is_steered, is_blind)
         if key != self._task_key:
             self._task_key = key
             self._task = self._task_of(self.mode)
@@ -236,6 +305,7 @@ class SimAutopilot:
         if mode is Mode.OFFBOARD and self._offboard_target is not None:
             return Offboard(self.parameters, *self._offboard_target)
         if mode is Mode.TAKEOFF:
+            self._took_off_here = self._land_detector.is_landed or self._took_off_here
             return Takeoff(self.parameters, self.estimate, min(self._takeoff_down_m(), self.estimate.position_m[2]))
         if mode is Mode.RTL and self.home is not None:
             task = Return(self.parameters, self.estimate, self.home.position_m, self.home.yaw_rad)
@@ -247,10 +317,14 @@ class SimAutopilot:
                 delay_s=_NAVIGATOR_S,
             )
             return task
-        if mode is Mode.LAND:
+        if mode is Mode.LAND and self.is_position_valid:
             return Land(self.parameters, self.estimate)
-        if self.commander.is_descending_without_sticks:
-            return Descend(self.parameters, self.estimate)
+        if mode is Mode.LAND or (mode.needs_sticks and self.sticks is None):
+            return Descend(self.parameters, self.estimate, is_blind=not self.is_position_valid)
+        if mode is Mode.POSCTL:
+            return StickTask(self.parameters, self.estimate, self._pilot)
+        if mode.needs_sticks:  # the model has no attitude or rate mode: it holds the altitude in all of them
+            return AltitudeTask(self.parameters, self.estimate, self._pilot)
         return Hold(self.parameters, self.estimate)
 
     def _takeoff_down_m(self) -> float:
@@ -261,7 +335,7 @@ class SimAutopilot:
                 return down_m
         height_m = self.parameters.get("MIS_TAKEOFF_ALT")
         self.say(Severity.INFO, f"Using default takeoff altitude: {height_m:.1f} m", delay_s=_NAVIGATOR_S)
-        return self.home.position_m[2] - height_m if self.home else -height_m
+        return self.estimate.position_m[2] - height_m  # from where it is, also in the air
 
     def _wants_takeoff(self) -> bool:
         """Whether the task would leave the ground: a take-off, or an offboard setpoint above."""
@@ -272,11 +346,14 @@ class SimAutopilot:
     def _detect_landing(self, dt_s: float) -> None:
         detector, ramp = self._land_detector, self._ramp.state
         was_landed, was_landing = detector.is_landed, self._was_landing
+        if not self.is_armed:
+            detector.rest()
+            return
         detector.step(
             dt_s,
             is_touching=self.vehicle.is_on_ground,
             is_ramping=ramp is Ramp.RAMPUP,
-            is_flying=ramp is Ramp.FLIGHT or not self.is_armed,
+            is_flying=ramp is Ramp.FLIGHT,
             thrust=self.thrust,
         )
         self._was_landing = isinstance(self._task, Return) and self._task.is_landing
@@ -290,6 +367,10 @@ class SimAutopilot:
             self.say(Severity.INFO, "Landing detected")
 
     def _observation(self) -> Observation:
+        distance_m = height_m = 0.0
+        if self.home is not None:
+            (n, e, d), (home_n, home_e, home_d) = self.estimate.position_m, self.home.position_m
+            distance_m, height_m = math.hypot(n - home_n, e - home_e), home_d - d
         return Observation(
             boot_s=self.boot_s,
             setpoint_age_s=None if self._setpoint_s is None else self.boot_s - self._setpoint_s,
@@ -297,9 +378,16 @@ class SimAutopilot:
             landed_s=self._land_detector.landed_s,
             has_taken_off=self._has_taken_off,
             battery=self.battery.remaining,
+            is_position_valid=self.is_position_valid,
+            has_sticks=self.sticks is not None,
+            is_stick_moving=self._pilot.is_moving,
+            distance_m=distance_m,
+            height_m=height_m,
         )
 
     def _set_home(self) -> None:
+        if not self.has_gps:
+            return
         yaw_rad = euler_of(self.estimate.quaternion)[2]
         self.home = Home(self.estimate.position_m, yaw_rad, self.boot_s)
 

@@ -1,9 +1,13 @@
 """A LiPo pack: the energy that thrust takes, and the voltage that is left under load."""
 
+import math
 from dataclasses import dataclass
 
 # Open-circuit voltage of a LiPo cell at 0, 10 ... 100 % of its charge [V].
 _CELL_V = (3.30, 3.60, 3.69, 3.73, 3.77, 3.80, 3.85, 3.92, 4.00, 4.08, 4.20)
+
+
+_FAILURE_S = 1.0  # a failed pack's charge falls with this time constant, as PX4's simulator was recorded
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,13 +28,14 @@ class Pack:
 class Battery:
     """The charge that is left. `remaining` is 0 to 1, `voltage_v` and `current_a` those under the last load."""
 
-    __slots__ = ("consumed_ah", "current_a", "pack", "remaining", "voltage_v")
+    __slots__ = ("consumed_ah", "current_a", "has_failed", "pack", "remaining", "voltage_v")
 
     def __init__(self, pack: Pack | None = None, remaining: float = 1.0) -> None:
-        """Start with `remaining` (0 to 1) of the pack's charge, and no load."""
+        """Start with `remaining` (0 to 1) of the pack's charge, and no load. Set `has_failed` to make it fail."""
         self.pack = pack or Pack()
         self.remaining = remaining
         self.consumed_ah = 0.0
+        self.has_failed = False
         self.current_a = 0.0
         self.voltage_v = self.open_circuit_v
 
@@ -49,3 +54,10 @@ class Battery:
         drawn_ah = self.current_a * dt_s / 3600
         self.consumed_ah += drawn_ah
         self.remaining = max(0.0, self.remaining - drawn_ah / self.pack.capacity_ah)
+        if self.has_failed:
+            self.remaining *= math.exp(-dt_s / _FAILURE_S)
+
+    def drain(self, dt_s: float, *, empty_after_s: float, least: float) -> None:
+        """Lose charge by the clock, down to `least` (0 to 1): SIM_BAT_DRAIN and SIM_BAT_MIN_PCT of PX4's simulator."""
+        if self.remaining > least:
+            self.remaining = max(least, self.remaining - (1.0 - least) * dt_s / empty_after_s)

@@ -1,49 +1,15 @@
-"""Who decides what the autopilot does: arming checks, flight modes, failsafes and the reasons to disarm.
+"""Who decides what the autopilot does: arming checks, flight modes, takeovers and the reasons to disarm.
 
 It knows nothing of motion: each step gets an `Observation`, and what it decides is read from its attributes.
 """
 
-import enum
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
+from sitl.failsafes import BatteryWarning, Failsafe, Failsafes, Observation, Say
 from sitl.modes import Answer, Mode, Severity
 from sitl.parameters import Parameters
 
-READY_S = 4.0  # flight time after boot until PX4's estimator and GPS let it arm
-
-Say = Callable[[Severity, str], None]
-
-
-class Failsafe(enum.Enum):
-    """Why the autopilot acts against the intended mode."""
-
-    OFFBOARD_LOSS = "offboard loss"
-    BATTERY = "battery"
-
-
-class BatteryWarning(enum.IntEnum):
-    """PX4's battery_status.warning."""
-
-    NONE = 0
-    LOW = 1
-    CRITICAL = 2
-    EMERGENCY = 3
-
-
-@dataclass(frozen=True, slots=True)
-class Observation:
-    """What the commander looks at: boot time [s], age of the newest offboard setpoint [s] (None: never one), and so on.
-
-    `is_landed` is the land detector's word, `landed_s` for how long, `has_taken_off` since arming; `battery` is 0 to 1.
-    """
-
-    boot_s: float
-    setpoint_age_s: float | None
-    is_landed: bool
-    landed_s: float
-    has_taken_off: bool
-    battery: float
+_PARKING = (Mode.LAND, Mode.RTL, Mode.TAKEOFF)  # modes that end with a landing, or that no disarmed vehicle keeps
 
 
 class Commander:
@@ -54,17 +20,15 @@ class Commander:
         self._parameters = parameters
         self._say = say
         self._speed = speed
-        self._seen = Observation(0.0, None, True, 0.0, False, 1.0)
+        self._seen = Observation()
+        self._failsafes = Failsafes(parameters, say)
         self.intended = Mode.LOITER
         self.mode = Mode.LOITER
         self.is_armed = False
         self.armed_s = 0.0
         self.failsafe: Failsafe | None = None
-        self.is_descending_without_sticks = False
         self._last_parking_mode = Mode.LOITER
-        self._warning = BatteryWarning.NONE
-        self._hold_until_s: float | None = None
-        self._battery_mode: Mode | None = None
+        self._was_mode_chosen = False
 
     @property
     def is_offboard_available(self) -> bool:
@@ -73,18 +37,29 @@ class Commander:
         return age_s is not None and age_s < self._parameters.get("COM_OF_LOSS_T") * self._speed
 
     @property
-    def is_ready(self) -> bool:
-        """Whether the estimator and GPS are good enough to fly."""
-        return self._seen.boot_s >= READY_S
+    def is_armable(self) -> bool:
+        """PX4's arming checks; a mode that cannot be flown, or not be taken off in, fails them too."""
+        seen = self._seen
+        if not seen.is_position_valid or self._failsafes.told_warning >= BatteryWarning.CRITICAL:
+            return False
+        if self.mode is Mode.OFFBOARD:
+            return self.is_offboard_available
+        if self.mode.needs_sticks:
+            return seen.has_sticks
+        return self.is_armed or self.mode in (Mode.LOITER, Mode.TAKEOFF)
 
     @property
-    def is_armable(self) -> bool:
-        """PX4's arming checks; on the ground a mode that cannot take off fails them too."""
-        if not self.is_ready or self._seen.battery < self._parameters.get("BAT_CRIT_THR"):
+    def warning(self) -> BatteryWarning:
+        """How low the battery is."""
+        return self._failsafes.warning
+
+    def can_fly(self, mode: Mode) -> bool:
+        """Whether an armed vehicle could enter a mode now."""
+        if mode is Mode.OFFBOARD and not self.is_offboard_available:
             return False
-        if self.intended is Mode.OFFBOARD:
-            return self.is_offboard_available
-        return self.is_armed or self.intended in (Mode.LOITER, Mode.TAKEOFF)
+        if mode.needs_sticks and not self._seen.has_sticks:
+            return False
+        return self._seen.is_position_valid or not mode.needs_position or mode is Mode.LAND
 
     def arm(self) -> Answer:
         """Arm; also accepted when already armed."""
@@ -110,17 +85,10 @@ class Commander:
 
     def request(self, mode: Mode) -> Answer:
         """Change the intended mode. Disarmed anything goes, and a bad mode only keeps from arming."""
-        if self.is_armed:
-            is_available = self.is_offboard_available if mode is Mode.OFFBOARD else not mode.needs_sticks
-            if not is_available:
-                self._say(Severity.CRITICAL, f"Switching to {mode.title} is currently not available")
-                return Answer.TEMPORARILY_REJECTED
-        self.intended = mode
-        if mode not in (Mode.LAND, Mode.RTL, Mode.TAKEOFF):
-            self._last_parking_mode = mode
-        # A person's decision ends a failsafe's reaction: it is theirs to fly on.
-        self._hold_until_s = self._battery_mode = None
-        self._enter(mode, None)
+        if self.is_armed and not self.can_fly(mode):
+            self._say(Severity.CRITICAL, f"Switching to {mode.title} is currently not available")
+            return Answer.TEMPORARILY_REJECTED
+        self._choose(mode)
         return Answer.ACCEPTED
 
     def see_setpoint(self) -> None:
@@ -137,14 +105,35 @@ class Commander:
     def step(self, seen: Observation) -> None:
         """Look at the vehicle, and react."""
         self._seen = seen
-        self._watch_battery()
-        if not self.is_armed:
-            self.mode = self.intended
+        if not self.is_armed and seen.has_sticks and not self._was_mode_chosen:
+            self._choose(Mode.POSCTL)  # PX4: who holds the sticks starts in Position, unless a mode was chosen
+        if self.is_armed and seen.is_landed and self._should_disarm():
             return
-        if seen.is_landed and self._should_disarm():
-            return
-        if not seen.is_landed or seen.has_taken_off:
-            self._fly_failsafes()
+        if self.is_armed and seen.is_stick_moving and self._may_take_over:
+            self._say(Severity.INFO, "Pilot took over using sticks")
+            self._choose(Mode.POSCTL if seen.is_position_valid else Mode.ALTCTL)
+        reaction = self._failsafes.step(
+            seen,
+            self.intended,
+            is_flying=self.is_armed and (not seen.is_landed or seen.has_taken_off),
+            is_offboard_available=self.is_offboard_available,
+        )
+        self.mode, self.failsafe = (reaction.mode, reaction.cause) if reaction else (self.intended, None)
+
+    @property
+    def _may_take_over(self) -> bool:
+        """Whether moved sticks end the flown mode (COM_RC_OVERRIDE: bit 0 automatic modes, bit 1 offboard)."""
+        bit = 2 if self.mode is Mode.OFFBOARD else 1 if self.mode.is_auto else 0
+        return bool(int(self._parameters.get("COM_RC_OVERRIDE")) & bit)
+
+    def _choose(self, mode: Mode) -> None:
+        self.intended = mode
+        self._was_mode_chosen = True
+        if mode not in _PARKING:
+            self._last_parking_mode = mode
+        # A person's decision ends a failsafe's reaction: it is theirs to fly on.
+        self._failsafes.release()
+        self.mode, self.failsafe = mode, None
 
     def _should_disarm(self) -> bool:
         get, seen = self._parameters.get, self._seen
@@ -160,62 +149,8 @@ class Commander:
     def _disarm(self, reason: str) -> None:
         self.is_armed = False
         self.failsafe = None
-        self.is_descending_without_sticks = False
-        self._hold_until_s = self._battery_mode = None
-        if self.intended in (Mode.LAND, Mode.RTL, Mode.TAKEOFF):
+        self._failsafes.release()
+        if self.intended in _PARKING:
             self.intended = self._last_parking_mode
         self.mode = self.intended
         self._say(Severity.INFO, f"Disarmed by {reason}")
-
-    def _enter(self, mode: Mode, failsafe: Failsafe | None) -> None:
-        self.mode = mode
-        self.failsafe = failsafe
-        self.is_descending_without_sticks = failsafe is not None and mode is Mode.POSCTL
-
-    def _fly_failsafes(self) -> None:
-        """The battery's reaction goes before that to a lost offboard stream."""
-        if self._battery_mode is not None:
-            if self._hold_until_s is not None and self._seen.boot_s >= self._hold_until_s:
-                self._hold_until_s = None
-                if self._warning is BatteryWarning.EMERGENCY:
-                    self._say(Severity.CRITICAL, "Failsafe activated")
-                    self._battery_mode = Mode.LAND
-                else:
-                    self._battery_mode = Mode.RTL
-            if self.mode is not self._battery_mode:
-                self._enter(self._battery_mode, Failsafe.BATTERY)
-        elif self.intended is Mode.OFFBOARD:
-            if self.is_offboard_available:
-                if self.failsafe is Failsafe.OFFBOARD_LOSS:
-                    self._enter(Mode.OFFBOARD, None)
-            elif self.failsafe is None:
-                self._lose_offboard()
-
-    def _lose_offboard(self) -> None:
-        """React to a lost stream by COM_OBL_RC_ACT; without sticks, the modes that need them come down slowly."""
-        self._say(Severity.CRITICAL, "Failsafe activated")
-        action = int(self._parameters.get("COM_OBL_RC_ACT"))
-        mode = {3: Mode.RTL, 4: Mode.LAND, 5: Mode.LOITER}.get(action, Mode.POSCTL)
-        self._enter(mode, Failsafe.OFFBOARD_LOSS)
-
-    def _watch_battery(self) -> None:
-        """PX4's three battery levels (BAT_LOW_THR, BAT_CRIT_THR, BAT_EMERGEN_THR), by COM_LOW_BAT_ACT."""
-        get, battery = self._parameters.get, self._seen.battery
-        warning = BatteryWarning(sum(battery < get(f"BAT_{level}_THR") for level in ("LOW", "CRIT", "EMERGEN")))
-        if warning <= self._warning:
-            return
-        self._warning = warning
-        words = {1: "Low battery", 2: "Critical battery", 3: "Emergency battery level"}
-        self._say(Severity.EMERGENCY, words[warning])
-        if not self.is_armed or self._seen.is_landed:
-            return
-        action = int(get("COM_LOW_BAT_ACT"))
-        if warning is BatteryWarning.LOW or action == 0:
-            self._say(Severity.CRITICAL, "Failsafe activated")
-        elif warning is BatteryWarning.CRITICAL:
-            delay_s = get("COM_FAIL_ACT_T")
-            self._say(Severity.CRITICAL, f"Failsafe activated: entering Hold for {delay_s:.0f} seconds")
-            self._battery_mode, self._hold_until_s = Mode.LOITER, self._seen.boot_s + delay_s
-        elif self._hold_until_s is None:
-            self._say(Severity.CRITICAL, "Failsafe activated")
-            self._battery_mode = Mode.LAND

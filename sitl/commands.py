@@ -9,11 +9,14 @@ RETURN_TO_LAUNCH = 20
 LAND = 21
 TAKEOFF = 22
 DO_SET_MODE = 176
+SET_ACTUATOR = 187
 REBOOT = 246
 MISSION_START = 300
 ARM_DISARM = 400
 RUN_PREARM_CHECKS = 401
+INJECT_FAILURE = 420
 _FORCE = 21196
+_UNIT_BATTERY, _TYPE_OFF = 100, 1  # FAILURE_UNIT, FAILURE_TYPE
 
 
 def execute(autopilot: SimAutopilot, command: int, params: tuple[float, ...]) -> Answer:
@@ -32,11 +35,23 @@ def execute(autopilot: SimAutopilot, command: int, params: tuple[float, ...]) ->
         return Answer.ACCEPTED  # the model's checks run all the time
     if command == DO_SET_MODE:
         return _set_mode(autopilot, params)
+    if command == SET_ACTUATOR:
+        return Answer.ACCEPTED  # nothing is connected
+    if command == INJECT_FAILURE:
+        return _inject_failure(autopilot, params)
     if command == MISSION_START:
         autopilot.say(Severity.CRITICAL, "Mission start denied! No valid mission")
         return Answer.DENIED
     if command == REBOOT:
         return Answer.DENIED if autopilot.is_armed else Answer.TEMPORARILY_REJECTED
+    return Answer.UNSUPPORTED
+
+
+def _inject_failure(autopilot: SimAutopilot, params: tuple[float, ...]) -> Answer:
+    """Params: FAILURE_UNIT, FAILURE_TYPE. PX4's simulator lets the battery fail, and takes the rest as good."""
+    if _is(params[0], _UNIT_BATTERY):
+        autopilot.battery.has_failed = _is(params[1], _TYPE_OFF)
+        return Answer.ACCEPTED
     return Answer.UNSUPPORTED
 
 

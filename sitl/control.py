@@ -20,6 +20,7 @@ class Setpoint:
     """What a flight task asks for: a position NED [m] (None: only velocity), a velocity NED [m/s] added to it, a yaw.
 
     `max_*` bound the resulting velocity [m/s], `max_tilt_rad` the thrust vector's angle from the vertical.
+    `lean_m_s2` (north, east) is a horizontal acceleration to lean for instead, whatever the position and velocity are.
     """
 
     position_m: tuple[float | None, float | None, float | None]
@@ -28,6 +29,7 @@ class Setpoint:
     max_up_m_s: float
     max_down_m_s: float
     max_tilt_rad: float
+    lean_m_s2: tuple[float, float] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,6 +83,9 @@ class PositionControl:
         an = p * error_n + integral_n - d * acceleration[0]
         ae = p * error_e + integral_e - d * acceleration[1]
         ad = pz * error_d + integral_d - dz * acceleration[2]
+        if setpoint.lean_m_s2 is not None:
+            an, ae = setpoint.lean_m_s2
+            error_n = error_e = 0.0
 
         # The body's z axis points against the wanted specific force; PX4 decouples it from the vertical acceleration.
         horizontal = math.hypot(an, ae)
@@ -107,7 +112,8 @@ class PositionControl:
             error_d = 0.0
         produced_n = thrust_n * GRAVITY_M_S2 / self._hover_thrust
         produced_e = thrust_e * GRAVITY_M_S2 / self._hover_thrust
-        if an * an + ae * ae > produced_n * produced_n + produced_e * produced_e:
+        is_limited = an * an + ae * ae > produced_n * produced_n + produced_e * produced_e
+        if is_limited and setpoint.lean_m_s2 is None:
             gain = 2.0 / p
             error_n -= gain * (an - produced_n)
             error_e -= gain * (ae - produced_e)

@@ -19,6 +19,7 @@ _ATTITUDE_S = 3.0
 _LEVEL_BIAS_RAD = math.radians(0.3)
 _COMPASS_BIAS_RAD = math.radians(1.5)
 _RATE_RAD_S = 0.01
+_ACCELERATION_M_S2 = 0.03  # what dead reckoning without GPS errs by
 
 
 class Estimator:
@@ -35,9 +36,18 @@ class Estimator:
         biases = random.Random(f"estimator biases {seed}")
         self._level_bias_rad = (biases.gauss(0.0, _LEVEL_BIAS_RAD), biases.gauss(0.0, _LEVEL_BIAS_RAD))
         self._compass_bias = quaternion_of(0.0, 0.0, biases.gauss(0.0, _COMPASS_BIAS_RAD))
+        self._lean_m_s2 = (biases.gauss(0.0, _ACCELERATION_M_S2), biases.gauss(0.0, _ACCELERATION_M_S2))
+        self._drift_m_s = self._drift_m = (0.0, 0.0)
 
-    def step(self, dt_s: float, vehicle: Vehicle) -> Estimate:
-        """The estimate after `dt_s` [s]."""
+    def step(self, dt_s: float, vehicle: Vehicle, *, has_gps: bool = True) -> Estimate:
+        """The estimate after `dt_s` [s]. Without GPS its position drifts away; with it again, it jumps back."""
+        if has_gps:
+            self._drift_m_s = self._drift_m = (0.0, 0.0)
+        elif self._is_noisy:
+            vn, ve = self._drift_m_s
+            vn, ve = vn + self._lean_m_s2[0] * dt_s, ve + self._lean_m_s2[1] * dt_s
+            self._drift_m_s = (vn, ve)
+            self._drift_m = (self._drift_m[0] + vn * dt_s, self._drift_m[1] + ve * dt_s)
         if not self._is_noisy:
             return Estimate(
                 vehicle.position_m,
@@ -60,8 +70,8 @@ class Estimator:
             self._attitude[axis] += -self._attitude[axis] * dt_s / _ATTITUDE_S + attitude_drive * gauss(0.0, 1.0)
         p, q, r = vehicle.rates_rad_s
         return Estimate(
-            _sum(vehicle.position_m, self._position),
-            _sum(vehicle.velocity_m_s, self._velocity),
+            _sum(vehicle.position_m, self._position, self._drift_m),
+            _sum(vehicle.velocity_m_s, self._velocity, self._drift_m_s),
             vehicle.acceleration_m_s2,
             self._turned(vehicle.quaternion),
             (p + gauss(0.0, _RATE_RAD_S), q + gauss(0.0, _RATE_RAD_S), r + gauss(0.0, _RATE_RAD_S)),
@@ -75,5 +85,5 @@ class Estimator:
         return multiply(multiply(self._compass_bias, quaternion), in_body)
 
 
-def _sum(truth: Vector, error: list[float]) -> Vector:
-    return (truth[0] + error[0], truth[1] + error[1], truth[2] + error[2])
+def _sum(truth: Vector, error: list[float], drift: tuple[float, float]) -> Vector:
+    return (truth[0] + error[0] + drift[0], truth[1] + error[1] + drift[1], truth[2] + error[2])

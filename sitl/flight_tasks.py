@@ -11,6 +11,7 @@ _REFERENCE_GAIN_1_S = 2.0
 _ARRIVAL_GAIN_1_S = 0.6
 _MAX_LAG_M = 2.0  # MPC_XY_ERR_MAX: the reference waits for a vehicle that falls further behind
 _APPROACH_M_S2 = 0.45  # how hard a climb or a descent brakes before its end, as recorded from PX4 v1.16
+_ARRIVED_M = 2.0  # from home, where a return begins to land, as recorded from PX4 v1.16
 _DESCEND_M_S = 0.6  # a failsafe descent without sticks, as recorded from PX4 v1.16
 _TAKEOFF_ACCELERATION_M_S2 = 0.5
 _YAW_RATE_RAD_S = math.radians(45.0)  # a turn that a task makes by itself
@@ -74,8 +75,8 @@ def _velocity_to(north_m: float, east_m: float, limit_m_s: float, braking_m_s2: 
     return (north_m * scale, east_m * scale)
 
 
-class _Auto:
-    """What the automatic tasks share: limits, a reference, and the yaw at their start."""
+class AutoTask:
+    """What the tasks share: limits, a reference, and the yaw at their start."""
 
     def __init__(self, parameters: Parameters, estimate: Estimate) -> None:
         self._parameters = parameters
@@ -96,7 +97,7 @@ class _Auto:
         step_rad = _YAW_RATE_RAD_S * dt_s
         self._yaw_rad = math.remainder(self._yaw_rad + clamp(left_rad, -step_rad, step_rad), 2 * math.pi)
 
-    def _setpoint(self) -> Setpoint:
+    def _setpoint(self, *, lean_m_s2: tuple[float, float] | None = None) -> Setpoint:
         n, e, d = self._reference.position_m
         vn, ve, vd = self._reference.velocity_m_s
         return Setpoint(
@@ -106,10 +107,11 @@ class _Auto:
             self._max_up_m_s,
             self._max_down_m_s,
             self._tilt_rad,
+            lean_m_s2,
         )
 
 
-class Hold(_Auto):
+class Hold(AutoTask):
     """Brake, then stay there."""
 
     def step(self, dt_s: float, estimate: Estimate, height_m: float) -> Setpoint:
@@ -118,7 +120,7 @@ class Hold(_Auto):
         return self._setpoint()
 
 
-class Takeoff(_Auto):
+class Takeoff(AutoTask):
     """Climb straight up to a height. `is_done` within NAV_MC_ALT_RAD of it, where PX4 goes on to Hold."""
 
     def __init__(self, parameters: Parameters, estimate: Estimate, target_down_m: float) -> None:
@@ -145,7 +147,7 @@ class Takeoff(_Auto):
         self._climb_m_s = 0.0
 
 
-class Land(_Auto):
+class Land(AutoTask):
     """Descend, slower towards the ground, until disarmed: where the vehicle is, or on a spot (north, east) [m]."""
 
     def __init__(
@@ -184,16 +186,21 @@ class Land(_Auto):
         return self._setpoint()
 
 
-class Descend(_Auto):
-    """Come down slowly where a mode needs sticks and there are none."""
+class Descend(AutoTask):
+    """Come down slowly where a mode needs sticks and there are none; level, and so with the wind, when blind."""
+
+    def __init__(self, parameters: Parameters, estimate: Estimate, *, is_blind: bool = False) -> None:
+        """`is_blind`: the horizontal position is not known."""
+        super().__init__(parameters, estimate)
+        self._is_blind = is_blind
 
     def step(self, dt_s: float, estimate: Estimate, height_m: float) -> Setpoint:
         """The setpoint after `dt_s` [s]."""
         self._reference.step(dt_s, (0.0, 0.0, _DESCEND_M_S), estimate.position_m)
-        return self._setpoint()
+        return self._setpoint(lean_m_s2=(0.0, 0.0) if self._is_blind else None)
 
 
-class Return(_Auto):
+class Return(AutoTask):
     """Climb if need be, fly home, turn as home was, descend and land there (PX4's rtl_direct)."""
 
     def __init__(self, parameters: Parameters, estimate: Estimate, home_m: Vector, home_yaw_rad: float) -> None:
@@ -221,7 +228,7 @@ class Return(_Auto):
         climb_m = self.return_height_m - (self._home_m[2] - d)
         radius_m = self._parameters.get("NAV_MC_ALT_RAD")
         self._has_climbed = self._has_climbed or climb_m < radius_m
-        if self._has_climbed and distance_m < 1.0 and math.hypot(*estimate.velocity_m_s[:2]) < 1.0:
+        if self._has_climbed and distance_m < _ARRIVED_M:
             self._landing = Land(self._parameters, estimate, self._home_m[:2], self._home_yaw_rad)
             return self._landing.step(dt_s, estimate, height_m)
         if distance_m < self._parameters.get("RTL_MIN_DIST"):

@@ -1,11 +1,9 @@
-"""The simulated autopilot's MAVLink face over UDP: streams out, commands, parameters and setpoints in.
+"""The simulated autopilot's MAVLink face: streams out, commands, parameters and setpoints in, as PX4's offboard link.
 
-It speaks as PX4's offboard link in SITL does: it sends to the application's port from a port of its own, and answers
-every station that writes to that port. `service` never blocks and knows no time but the autopilot's.
+It turns bytes into bytes and knows no time but the autopilot's; sitl.udp carries them.
 """
 
 import math
-import socket
 import struct
 from collections import deque
 from typing import Any
@@ -19,15 +17,17 @@ from sitl.modes import Answer, Severity
 from sitl.parameters import Parameter
 from sitl.telemetry import STREAMS, Stream
 
-_OWN_PORT_OFFSET = 40  # PX4: 14580 speaks to 14540
-_LAST_PORT = 65535
 _FIRST_BEAT_S = 0.24  # after boot; the heartbeat keeps this fraction of each second
 _COMMAND_S = 0.008  # a command waits this long for PX4's commander, in flight time
 _TEXT_CHUNK = 50
+_KEPT_TEXTS = 8
+_FIRST_TEXT_S = 2.5  # after boot
+_HEARTBEAT_LOSS_S = 2.5
 _PARAMETERS_PER_SERVICE = 4
 _SYSTEM, _COMPONENT = 1, 1
 _GET_MESSAGE_INTERVAL, _SET_MESSAGE_INTERVAL, _REQUEST_MESSAGE = 510, 511, 512
 _REQUEST_CAPABILITIES = 520
+_ABOUT_MESSAGES = (_GET_MESSAGE_INTERVAL, _SET_MESSAGE_INTERVAL, _REQUEST_MESSAGE, _REQUEST_CAPABILITIES)
 _AUTOPILOT_VERSION = 148
 _FLOAT, _INT32 = 9, 6  # MAV_PARAM_TYPE
 _IGNORE_POSITION, _IGNORE_YAW = 0x7, 0x400  # POSITION_TARGET_TYPEMASK
@@ -35,8 +35,6 @@ _LOCAL_NED = 1  # MAV_FRAME
 _MAX_INTERVAL_US = 2**31 - 1  # what MESSAGE_INTERVAL can tell
 
 _COMPONENT_METADATA, _COMPONENT_METADATA_EXTRA = 397, 182
-
-Address = tuple[str, int]
 
 
 class _NoComponentMetadata(dialect.MAVLink_message):  # type: ignore[misc]
@@ -51,59 +49,44 @@ class _NoComponentMetadata(dialect.MAVLink_message):  # type: ignore[misc]
 
 
 class MavlinkFace:
-    """One autopilot's UDP link. Use it as a context manager, or `close` it."""
+    """One autopilot's end of a MAVLink link: bytes in by `receive`, bytes out by `service`."""
 
-    def __init__(self, autopilot: SimAutopilot, port: int, host: str = "127.0.0.1") -> None:
-        """Speak to `host`:`port` from port + 40; raises OSError with a sentence when it cannot have that port."""
+    def __init__(self, autopilot: SimAutopilot, *, first_beat_s: float = _FIRST_BEAT_S) -> None:
+        """Speak for `autopilot`, whose streams begin `first_beat_s` [s] after now."""
         self._autopilot = autopilot
-        if port + _OWN_PORT_OFFSET > _LAST_PORT:
-            raise OSError(
-                f"UDP port {port} leaves none for the simulated autopilot, which speaks from {_OWN_PORT_OFFSET} above; "
-                f"choose a port up to {_LAST_PORT - _OWN_PORT_OFFSET}"
-            )
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        self._socket.setblocking(False)
-        try:
-            self._socket.bind(("127.0.0.1", port + _OWN_PORT_OFFSET))
-        except OSError as error:
-            self._socket.close()
-            raise OSError(
-                f"UDP port {port + _OWN_PORT_OFFSET} for the simulated autopilot cannot be had ({error.strerror}); "
-                "end the other simulation or choose another port"
-            ) from error
-        # The application is spoken to unasked, other stations once they were heard.
-        self._stations: list[Address] = [(host, port)]
+        self._outbox: list[bytes] = []
         self._mavlink: Any = dialect.MAVLink(None, srcSystem=_SYSTEM, srcComponent=_COMPONENT)
         self._streams = {stream.message_id: stream for stream in STREAMS}
-        first_s = autopilot.boot_s + _FIRST_BEAT_S
+        first_s = autopilot.boot_s + first_beat_s
         self._due_s = {stream.message_id: first_s for stream in STREAMS if stream.rate_hz > 0}
         self._intervals_s = {stream.message_id: 1 / stream.rate_hz for stream in STREAMS if stream.rate_hz > 0}
         self._commands: deque[tuple[float, Any, int, tuple[float, ...]]] = deque()
         self._parameters: deque[Parameter] = deque()
         self._has_refused_frame = False
         self._n_texts = 0
+        # PX4 keeps its texts while no ground station is there to read them; a full queue loses the oldest.
+        self._texts: deque[tuple[Severity, str]] = deque(maxlen=_KEPT_TEXTS)
+        self._heard_s = -math.inf
         self._n_pings = 0
         self._ping_s = autopilot.boot_s
 
-    def __enter__(self) -> "MavlinkFace":
-        return self
+    def receive(self, data: bytes) -> None:
+        """Take a datagram: whole messages, so that a broken one does not spoil the next."""
+        parser: Any = dialect.MAVLink(None)
+        parser.robust_parsing = True
+        for message in parser.parse_buffer(data) or ():
+            self._receive(message)
 
-    def __exit__(self, *_: object) -> None:
-        self.close()
-
-    def close(self) -> None:
-        """Let go of the port."""
-        self._socket.close()
-
-    def service(self) -> None:
-        """Read what came, carry out what is due, and send what is due."""
-        self._read()
+    def service(self) -> list[bytes]:
+        """Carry out what is due now, in the autopilot's time; returns the messages to send, in order."""
         now_s = self._autopilot.boot_s
         while self._commands and self._commands[0][0] <= now_s:
             _, message, command, params = self._commands.popleft()
             self._acknowledge(message, command, self._execute(command, params))
-        for severity, text in self._autopilot.drain_texts():
-            self._send_text(severity, text)
+        self._texts.extend(self._autopilot.drain_texts())
+        if self._is_heard(now_s):
+            while self._texts:
+                self._send_text(*self._texts.popleft())
         for _ in range(min(_PARAMETERS_PER_SERVICE, len(self._parameters))):
             self._send_parameter(self._parameters.popleft())
         for message_id, due_s in self._due_s.items():
@@ -116,22 +99,10 @@ class MavlinkFace:
             self._ping_s = now_s + 1.0
             self._send(self._mavlink.ping_encode(round(now_s * 1e6), self._n_pings, 0, 0))
             self._n_pings += 1
+        sent, self._outbox = self._outbox, []
+        return sent
 
     # --- in ---
-
-    def _read(self) -> None:
-        while True:
-            try:
-                data, address = self._socket.recvfrom(65535)
-            except (BlockingIOError, ConnectionRefusedError):
-                return
-            if address not in self._stations:
-                self._stations.append(address)
-            # A datagram holds whole messages, so a broken one must not spoil the next: each gets its own parser.
-            parser: Any = dialect.MAVLink(None)
-            parser.robust_parsing = True
-            for message in parser.parse_buffer(data) or ():
-                self._receive(message)
 
     def _receive(self, message: Any) -> None:
         handler = getattr(self, f"_on_{message.get_type().lower()}", None)
@@ -153,6 +124,10 @@ class MavlinkFace:
         if message.command == commands.DO_SET_MODE:
             # PX4's MAVLink module answers at once, its commander again with what came of it.
             self._acknowledge(message, message.command, Answer.ACCEPTED)
+        elif message.command in _ABOUT_MESSAGES:
+            # These are the module's own, and never wait for the commander.
+            self._acknowledge(message, message.command, self._execute(message.command, params))
+            return
         self._commands.append((self._autopilot.boot_s + _COMMAND_S, message, message.command, params))
 
     def _on_set_position_target_local_ned(self, message: Any) -> None:
@@ -164,6 +139,11 @@ class MavlinkFace:
         elif message.type_mask & _IGNORE_POSITION == 0:
             yaw_rad = math.nan if message.type_mask & _IGNORE_YAW else message.yaw
             self._autopilot.set_position_setpoint(message.x, message.y, message.z, yaw_rad)
+
+    def _on_manual_control(self, message: Any) -> None:
+        if message.target in (0, _SYSTEM):
+            x, y, z, r = (value / 1000 for value in (message.x, message.y, message.z, message.r))
+            self._autopilot.set_sticks(x, y, z, r)
 
     def _on_param_request_read(self, message: Any) -> None:
         try:
@@ -183,12 +163,24 @@ class MavlinkFace:
         if message.param_type == _INT32:
             value = struct.unpack("<i", struct.pack("<f", message.param_value))[0]
         try:
+            before = self._autopilot.parameters.parameter(message.param_id)
             self._autopilot.set_parameter(message.param_id, value)
         except (KeyError, TypeError):
             return
         except ValueError as error:
             self._autopilot.say(Severity.WARNING, f"Refused: {error}")  # and the old value is the answer
-        self._send_parameter(self._autopilot.parameters.parameter(message.param_id))
+        parameter = self._autopilot.parameters.parameter(message.param_id)
+        self._send_parameter(parameter)
+        if parameter != before:
+            self._parameters.append(parameter)  # PX4 answers, and then tells every station of the change
+
+    def _is_heard(self, now_s: float) -> bool:
+        """Whether a ground station's heartbeat came of late."""
+        return now_s >= _FIRST_TEXT_S and now_s - self._heard_s < _HEARTBEAT_LOSS_S
+
+    def _on_heartbeat(self, message: Any) -> None:
+        if message.type == dialect.MAV_TYPE_GCS:
+            self._heard_s = self._autopilot.boot_s
 
     def _on_ping(self, message: Any) -> None:
         if message.target_system == 0:
@@ -204,7 +196,7 @@ class MavlinkFace:
     def _execute(self, command: int, params: tuple[float, ...]) -> Answer:
         if command == _REQUEST_CAPABILITIES:
             return self._request_message(_AUTOPILOT_VERSION)
-        if command in (_SET_MESSAGE_INTERVAL, _GET_MESSAGE_INTERVAL, _REQUEST_MESSAGE):
+        if command in _ABOUT_MESSAGES:
             message_id = round(params[0]) if math.isfinite(params[0]) else -1
             if command == _SET_MESSAGE_INTERVAL:
                 return self._set_interval(message_id, params[1])
@@ -242,13 +234,8 @@ class MavlinkFace:
     # --- out ---
 
     def _send(self, message: Any) -> None:
-        data = message.pack(self._mavlink)
+        self._outbox.append(message.pack(self._mavlink))
         self._mavlink.seq = (self._mavlink.seq + 1) % 256
-        for station in self._stations:
-            try:
-                self._socket.sendto(data, station)
-            except OSError:
-                continue  # a full queue or a station that went away loses messages, as any UDP link does
 
     def _send_stream(self, stream: Stream) -> bool:
         fields = stream.fields(self._autopilot)
@@ -259,7 +246,8 @@ class MavlinkFace:
 
     def _send_text(self, severity: int, text: str) -> None:
         """Send a text as PX4 does: a tab says that it also exists as an event, and 50 characters make a chunk."""
-        data = f"{text}\t".encode("ascii", "replace")
+        end = "" if text.startswith("Preflight") else "\t"
+        data = f"{text}{end}".encode("ascii", "replace")
         for chunk, start in enumerate(range(0, len(data), _TEXT_CHUNK)):
             piece = data[start : start + _TEXT_CHUNK]
             self._send(self._mavlink.statustext_encode(int(severity), piece, self._n_texts % 65536, chunk))

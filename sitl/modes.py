@@ -29,6 +29,11 @@ class Mode(enum.IntEnum):
         return not self.is_auto and self is not Mode.OFFBOARD
 
     @property
+    def needs_position(self) -> bool:
+        """Whether it flies by the horizontal position."""
+        return self.is_auto or self in (Mode.OFFBOARD, Mode.POSCTL)
+
+    @property
     def title(self) -> str:
         """PX4's name for a person."""
         return _TITLES[self]

@@ -10,6 +10,7 @@ from sitl.mavlink import MavlinkFace
 from sitl.parameters import Parameters
 from sitl.place import Origin
 from sitl.pose import Pose, PoseBlock
+from sitl.udp import UdpLink
 from sitl.vehicle import Vehicle
 from sitl.wind import Wind
 
@@ -71,7 +72,7 @@ def run(settings: SitlSettings, should_stop: Callable[[], bool]) -> SitlSummary:
     forgive_ns = round(_FORGIVE_WALL_NS * clock.speed)
     n_steps = 0
     try:
-        with MavlinkFace(autopilot, settings.port) as face:
+        with UdpLink(MavlinkFace(autopilot), settings.port) as link:
             began_s = time.monotonic()
             flight_ns = clock.now_ns()
             while not should_stop():
@@ -80,7 +81,7 @@ def run(settings: SitlSettings, should_stop: Callable[[], bool]) -> SitlSummary:
                     flight_ns = now_ns - forgive_ns
                 for _ in range(min(_MAX_BURST, (now_ns - flight_ns) // _STEP_NS)):
                     autopilot.step(_STEP_S)
-                    face.service()
+                    link.service()
                     flight_ns += _STEP_NS
                     n_steps += 1
                     if pose_block is not None:

@@ -79,6 +79,10 @@ class LandDetector:
         """Whether the vehicle stands long enough that thrust may go to its minimum."""
         return not self.is_landed and self._contact_s >= _LET_GO_S
 
+    def rest(self) -> None:
+        """The motors are off: PX4 takes that for landed, wherever the vehicle is."""
+        self.is_landed = True
+
     def step(self, dt_s: float, *, is_touching: bool, is_ramping: bool, is_flying: bool, thrust: float) -> None:
         """Move on by `dt_s` [s]; `thrust` is what the controller asks, 0 to 1."""
         if self.is_landed:

@@ -15,11 +15,13 @@ Fields = tuple[object, ...]
 
 _NAN = math.nan
 _SAFETY_ARMED = 0x80
-_SENSORS_EARLY = (0x0200400F, 0x0201400F, 0x0320883F)  # present, enabled, healthy until GPS is used
-_SENSORS_READY = (0x0200402F, 0x0201402F, 0x0320C83F)
-_PREARM_OK = 0x10000000
+# SYS_STATUS as recorded: what is always there, and the MAV_SYS_STATUS_SENSOR bits that come and go.
+_PRESENT, _ENABLED, _HEALTHY = 0x0200400F, 0x0201400F, 0x0320881F
+_GPS, _XY_POSITION, _RC, _BATTERY, _PREARM = 0x20, 0x4000, 0x10000, 0x02000000, 0x10000000
+_GIT_HASH = (0, 0, 0, 121, 18, 32, 203, 148)  # of v1.16.1, as AUTOPILOT_VERSION told it
 _FIRST_STATUS_S = 2.0
-_STANDARD_MODES = {Mode.POSCTL: 1, Mode.ALTCTL: 3, Mode.RTL: 5, Mode.MISSION: 6, Mode.LAND: 7, Mode.TAKEOFF: 8}
+_FIRST_POSITION_S = 2.5
+_STANDARD_MODES = {Mode.POSCTL: 1, Mode.ALTCTL: 4, Mode.RTL: 5, Mode.MISSION: 6, Mode.LAND: 7, Mode.TAKEOFF: 8}
 _STANDBY, _ACTIVE, _CRITICAL, _UNINIT = 3, 4, 5, 0
 
 
@@ -79,7 +81,7 @@ def _local_position(autopilot: SimAutopilot) -> Fields:
 
 
 def _global_position(autopilot: SimAutopilot) -> Fields | None:
-    if not autopilot.commander.is_ready or autopilot.home is None:
+    if autopilot.boot_s < _FIRST_POSITION_S or autopilot.home is None:
         return None
     estimate = autopilot.estimate
     latitude, longitude, altitude_mm = _e7(autopilot, estimate.position_m)
@@ -139,6 +141,9 @@ def _position_target(autopilot: SimAutopilot) -> Fields:
 
 def _gps_raw(autopilot: SimAutopilot) -> Fields:
     n, e, _ = autopilot.estimate.velocity_m_s
+    if not autopilot.has_gps:  # as recorded: no fix, and the last position
+        last = _e7(autopilot, autopilot.last_fix_m)
+        return _us(autopilot), 0, *last, 10000, 10000, 0, 0, 0, last[2], 100000, 100000, 10000, 0, 0
     course = round(math.degrees(math.atan2(e, n)) % 360 * 100) % 36000
     position = _e7(autopilot, autopilot.estimate.position_m)
     speed_cm_s = round(math.hypot(n, e) * 100)
@@ -146,14 +151,30 @@ def _gps_raw(autopilot: SimAutopilot) -> Fields:
 
 
 def _sys_status(autopilot: SimAutopilot) -> Fields:
-    battery, commander = autopilot.battery, autopilot.commander
-    if autopilot.boot_s < _FIRST_STATUS_S:
-        present, enabled, health = 0, 0, 0x0321C83F
-    else:
-        present, enabled, health = _SENSORS_READY if commander.is_ready else _SENSORS_EARLY
-        health |= _PREARM_OK if commander.is_armable else 0
+    battery = autopilot.battery
+    present, enabled, health = _sensors(autopilot)
     electric = round(battery.voltage_v * 1e3), round(battery.current_a * 100), _percent(autopilot)
     return present, enabled, health, 220, *electric, 0, 0, 0, 0, 0, 0, 0, 0, 1
+
+
+def _sensors(autopilot: SimAutopilot) -> tuple[int, int, int]:
+    """The sensors that are present, enabled and healthy, MAV_SYS_STATUS_SENSOR bits."""
+    if autopilot.boot_s < _FIRST_STATUS_S:
+        return 0, 0, 0x0321C83F
+    present, enabled, health = _PRESENT, _ENABLED, _HEALTHY | _GPS
+    if autopilot.is_position_ok:
+        present, enabled = present | _GPS, enabled | _GPS
+    elif not autopilot.has_gps and not autopilot.is_armed:
+        enabled, health = enabled | _GPS, health & ~_GPS  # a receiver without a fix keeps from arming
+    if autopilot.is_position_valid:
+        health |= _XY_POSITION
+    if autopilot.sticks is not None:
+        present, health = present | _RC, health | _RC
+    if autopilot.commander.warning:
+        health &= ~_BATTERY
+    if autopilot.commander.is_armable:
+        health |= _PREARM
+    return present, enabled, health
 
 
 def _percent(autopilot: SimAutopilot) -> int:
@@ -185,9 +206,27 @@ def _extended_sys_state(autopilot: SimAutopilot) -> Fields:
     return 0, int(autopilot.landed)
 
 
+def _uid2(autopilot: SimAutopilot) -> list[int]:
+    """The 18 bytes of the hardware's longer number: the short one, and zeros."""
+    return [*autopilot.uid.to_bytes(8, "big"), *[0] * 10]
+
+
 def _autopilot_version(autopilot: SimAutopilot) -> Fields:
     version = 17826303  # 1.16.1 release, as PX4 packs it
-    return 59647, version, version, 101854463, 1, [0] * 8, [0] * 8, [0] * 8, 0, 0, 1, [0] * 18
+    return (
+        59647,
+        version,
+        version,
+        101854463,
+        1,
+        list(_GIT_HASH),
+        list(_GIT_HASH),
+        [0] * 8,
+        0,
+        0,
+        autopilot.uid,
+        _uid2(autopilot),
+    )
 
 
 def _origin(autopilot: SimAutopilot) -> Fields:

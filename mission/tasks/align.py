@@ -24,6 +24,7 @@ class AlignTask:
 
     needs_line = True
     needs_vision = True
+    progress = 0.0
 
     def __init__(
         self, turn: Literal["nearest", "right", "left"], n_detections: int, guidance: GuidanceSettings

@@ -10,6 +10,7 @@ class ChangeAltitudeTask:
 
     needs_line = False
     needs_vision = False
+    progress = 0.0
 
     def __init__(self, altitude_m: float, guidance: GuidanceSettings, memory: FlightMemory) -> None:
         self._down_m = memory.start.down_m - altitude_m

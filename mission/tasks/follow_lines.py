@@ -33,6 +33,11 @@ class FollowLinesTask:
         self._line: WorldLine | None = None
         self._unseen_s = 0.0
 
+    @property
+    def progress(self) -> float:
+        """The way flown so far [m]."""
+        return self._odometer.moved_m
+
     def step(self, reference: Setpoint, seen: Observation) -> Step:
         """Turn, go ahead, and (centred) go sideways."""
         guidance = self._guidance

@@ -1,10 +1,14 @@
 """Land and return: leave the way down to the autopilot's own modes, and see it disarm."""
 
-from mission.autopilot import FlightMode, LandedState, Setpoint
-from mission.tasks.task import Command, Observation, Step
+import math
+
+from mission.autopilot import FlightMode, LandedState, Setpoint, VehicleState
+from mission.tasks.task import Command, FlightMemory, Observation, Step
 
 _TELEMETRY_LAG_S = 3.0
 """A vehicle that was armed a moment ago still says disarmed, and an old mode: the heartbeat comes once a second."""
+
+_HOME_M = 5.0
 
 _MODES = {
     Command.LAND: frozenset({FlightMode.LAND}),
@@ -21,9 +25,11 @@ class GoDownTask:
 
     needs_line = False
     needs_vision = False
+    progress = 0.0
 
-    def __init__(self, command: Command, pause_s: float = 0.0) -> None:
+    def __init__(self, command: Command, memory: FlightMemory, pause_s: float = 0.0) -> None:
         self.command = command
+        self._memory = memory
         self._wait_s = pause_s
         self._is_commanded = False
 
@@ -34,9 +40,17 @@ class GoDownTask:
             return Step()
         state = seen.state
         if self._is_commanded and not state.is_armed and state.landed is LandedState.ON_GROUND:
-            return Step(done="landed and disarmed")
+            return Step(done=self._landed_words(state))
         if self._is_commanded and state.mode in _MODES[self.command]:
             return Step()
         self._is_commanded = True
         self._wait_s = _TELEMETRY_LAG_S
         return Step(command=self.command)
+
+    def _landed_words(self, state: VehicleState) -> str:
+        """A return that ended somewhere else, by a failsafe of the autopilot's, must not read as one that came home."""
+        start = self._memory.start
+        away_m = math.hypot(state.north_m - start.north_m, state.east_m - start.east_m)
+        if self.command is Command.LAND or away_m < _HOME_M:
+            return "landed and disarmed"
+        return f"landed and disarmed {away_m:.0f} m from the take-off point"

@@ -12,8 +12,10 @@ class HoldTask:
 
     def __init__(self, duration_s: float) -> None:
         self._left_s = duration_s
+        self.progress = 0.0
 
     def step(self, reference: Setpoint, seen: Observation) -> Step:
         """Keep the reference."""
         self._left_s -= seen.dt_s
+        self.progress += seen.dt_s
         return Step(reference, done="held" if self._left_s <= 0.0 else None)

@@ -18,6 +18,11 @@ class MoveForwardTask:
         self._memory = memory
         self._odometer = Odometer()
 
+    @property
+    def progress(self) -> float:
+        """The way flown so far [m]."""
+        return self._odometer.moved_m
+
     def step(self, reference: Setpoint, seen: Observation) -> Step:
         """Move the reference by r dt, at most by what is left."""
         distance_m = self._memory.move_until_m if self._distance_m is None else self._distance_m

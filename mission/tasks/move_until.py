@@ -37,6 +37,11 @@ class MoveUntilTask:
         self._blind_s = 0.0
         self._goal_m: float | None = None
 
+    @property
+    def progress(self) -> float:
+        """The way flown so far [m]."""
+        return self._odometer.moved_m
+
     def step(self, reference: Setpoint, seen: Observation) -> Step:
         """Move the reference along theta_0, or to where the line crosses the way once that is known."""
         heading_rad = self._memory.theta_0_rad

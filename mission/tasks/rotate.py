@@ -18,6 +18,7 @@ class RotateTask:
 
     def __init__(self, angle_rad: float, guidance: GuidanceSettings) -> None:
         self._left_rad = angle_rad
+        self.progress = 0.0
         self._guidance = guidance
 
     def step(self, reference: Setpoint, seen: Observation) -> Step:
@@ -25,6 +26,7 @@ class RotateTask:
         limit_rad = self._guidance.yaw_rate_rad_s * seen.dt_s
         turn_rad = max(-limit_rad, min(limit_rad, self._left_rad))
         self._left_rad -= turn_rad
+        self.progress += turn_rad
         setpoint = replace(reference, yaw_rad=wrap_angle_rad(reference.yaw_rad + turn_rad))
         error_rad = abs(wrap_angle_rad(setpoint.yaw_rad - seen.state.yaw_rad))
         if self._left_rad == 0.0 and error_rad <= _REACHED_RAD:

@@ -20,6 +20,7 @@ class TakeoffTask:
 
     needs_line = False
     needs_vision = False
+    progress = 0.0
 
     def __init__(self, altitude_m: float, guidance: GuidanceSettings, memory: FlightMemory) -> None:
         self._altitude_m = altitude_m
@@ -32,7 +33,7 @@ class TakeoffTask:
         """Command, wait until the autopilot has done its part, then move the reference over the take-off point."""
         if self._commands:
             return Step(command=self._commands.pop(0), altitude_m=self._altitude_m)
-        state, start = seen.state, self._memory.start
+        state, start = seen.state, self._memory.pad or self._memory.start
         if not self._is_up:
             short_m = state.down_m - (start.down_m - self._altitude_m)
             if short_m > max(_SHORT_M, _SHORT_SHARE * self._altitude_m):

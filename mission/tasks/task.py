@@ -5,11 +5,12 @@ Tasks do no I/O and know no time but the observation's, so that they can be flow
 
 import enum
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Protocol
 
 from mission.autopilot import FlightMode, Setpoint, VehicleState
 from mission.guidance import WorldLine
+from mission.trail import Trail
 from vision.records import LineEstimate
 
 
@@ -41,13 +42,17 @@ class Observation:
 class FlightMemory:
     """What later tasks need of earlier ones.
 
-    `start` is where the vehicle stood when the mission began; `move_until_m` is how far from there, along theta_0, the
-    last move_until ended.
+    `start` is where the vehicle stood when the mission began, `pad` where a resumed mission takes off again (None: at
+    the start); `move_until_m` is how far from the start, along theta_0, the last move_until ended. `trail` is the way
+    flown, and `line_seen_at` the place where the line was last seen.
     """
 
     start: Setpoint
     theta_0_rad: float
     move_until_m: float | None = None
+    pad: Setpoint | None = None
+    trail: Trail = field(default_factory=Trail)
+    line_seen_at: Setpoint | None = None
 
 
 class Command(enum.Enum):
@@ -86,6 +91,11 @@ class Task(Protocol):
     @property
     def needs_vision(self) -> bool:
         """Whether it cannot go on without the vision worker."""
+        ...
+
+    @property
+    def progress(self) -> float:
+        """How far the task has come: metres flown, radians turned or seconds held; 0 where it has no such measure."""
         ...
 
     def step(self, reference: Setpoint, seen: Observation) -> Step:

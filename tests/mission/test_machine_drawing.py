@@ -25,7 +25,7 @@ def drawn(machine: FlightMachine) -> set[tuple[str, str, str]]:
 
 @pytest.mark.parametrize("tasks", [TASKS, ["takeoff", "land"], ["takeoff", *["hold"] * 12, "return"]])
 def test_the_drawing_has_every_transition_and_no_other(tasks: list[str]) -> None:
-    machine = FlightMachine(tasks, lambda state: None)
+    machine = FlightMachine(tasks)
     assert drawn(machine) == {
         (source, trigger, transition.dest)
         for trigger, event in machine.machine.events.items()
@@ -35,7 +35,7 @@ def test_the_drawing_has_every_transition_and_no_other(tasks: list[str]) -> None
 
 
 def test_a_state_that_leads_to_every_task_is_drawn_with_one_arrow() -> None:
-    machine = FlightMachine(TASKS, lambda state: None)
+    machine = FlightMachine(TASKS)
     machine.machine.add_state("waiting")
     machine.machine.add_transition("pause", machine.task_states, "waiting")
     for state in machine.task_states:
@@ -45,7 +45,7 @@ def test_a_state_that_leads_to_every_task_is_drawn_with_one_arrow() -> None:
 
 
 def test_no_identifier_begins_with_a_digit() -> None:
-    assert not re.search(r"^ *\d|--> \d", mermaid(FlightMachine(TASKS, lambda state: None)), re.M)
+    assert not re.search(r"^ *\d|--> \d", mermaid(FlightMachine(TASKS)), re.M)
 
 
 def test_check_draws_the_machine_of_a_mission() -> None:

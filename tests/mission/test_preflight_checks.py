@@ -131,10 +131,10 @@ def wait(
         eyes = GeometricEyes(autopilot, clock, pinhole_intrinsics(PLAN.camera), LINE_POINT_NED_M, LINE_HEADING_RAD)
         spoil(autopilot, eyes)
         plan = PLAN.model_copy(update={"vehicle": VehiclePlan(ready_time_limit_s=time_limit_s)})
-        checks = await wait_until_ready(
+        readiness = await wait_until_ready(
             autopilot, eyes, clock, plan, lambda: 10**12, lambda: False, lambda missing: None
         )
-        return {check.name: check for check in checks}, asyncio.get_running_loop().time()
+        return {check.name: check for check in readiness.checks}, asyncio.get_running_loop().time()
 
     return run_virtually(waiting())
 
@@ -189,18 +189,21 @@ def test_a_failure_that_lasts_a_moment_only_ends_nothing() -> None:
 
 
 def test_a_refused_vehicle_is_never_armed_and_the_log_says_why() -> None:
-    async def flight() -> tuple[MissionEnded, KeptLog, InProcessAutopilot, list[Check]]:
-        clock, log, told = VirtualClock(), KeptLog(lambda item: None), []
+    told: list[Check] = []
+
+    async def flight() -> tuple[MissionEnded, KeptLog, InProcessAutopilot]:
+        clock, log = VirtualClock(), KeptLog(lambda item: None)
         autopilot = InProcessAutopilot(clock)
         autopilot.sim.set_parameter("RTL_RETURN_ALT", 12.0)
         camera = pinhole_intrinsics(PLAN.camera)
         eyes = GeometricEyes(autopilot, clock, camera, LINE_POINT_NED_M, LINE_HEADING_RAD)
-        executive = Executive(PLAN, autopilot, eyes, log, clock, camera, lambda: 10**12, told.extend)
+        crew = Crew(autopilot, eyes, camera, log, Logbook(NoJournal(), PAPERS), ComputerView)
+        executive = Executive(PLAN, crew, clock, on_checks=told.extend)
         ended = await executive.run()
         assert not executive.may_have_armed
-        return ended, log, autopilot, told
+        return ended, log, autopilot
 
-    ended, log, autopilot, told = run_virtually(flight())
+    ended, log, autopilot = run_virtually(flight())
     assert ended.result is Result.FAILED
     assert "return altitude: RTL_RETURN_ALT is 12 m" in ended.reason
     assert autopilot.commands == []

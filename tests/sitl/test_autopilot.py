@@ -5,70 +5,11 @@ import math
 import pytest
 
 from sitl.autopilot import SimAutopilot
-from sitl.commander import Failsafe
+from sitl.failsafes import Failsafe
 from sitl.modes import Answer, Landed, Mode
-from sitl.parameters import Parameters
 from sitl.vehicle import euler_of
 from sitl.wind import Wind
-
-STEP_S = 0.004
-
-
-class Flight:
-    """An autopilot in virtual time, with an application that sends setpoints at 20 Hz while `target` is set."""
-
-    def __init__(self, changes: dict[str, float | int] | None = None, *, speed: float = 1.0, wind_m_s: float = 0.0):
-        parameters = Parameters({"MIS_TAKEOFF_ALT": 6.0, **(changes or {})})
-        self.autopilot = SimAutopilot(parameters=parameters, wind=Wind(wind_m_s, 5), seed=5, speed=speed)
-        self.target: tuple[float, float, float, float] | None = None
-        self.texts: list[tuple[float, str]] = []
-        self.modes: list[Mode] = [self.autopilot.mode]
-        self.landed: list[Landed] = [self.autopilot.landed]
-        self._steps = 0
-
-    def run(self, time_s: float) -> None:
-        for _ in range(round(time_s / STEP_S)):
-            self.step()
-
-    def run_until(self, is_reached, within_s: float = 60.0) -> float:  # type: ignore[no-untyped-def]
-        """Run until `is_reached()`; returns how long it took [s]."""
-        began_s = self.autopilot.boot_s
-        while not is_reached():
-            self.step()
-            assert self.autopilot.boot_s - began_s < within_s, f"not reached; heard {self.texts}"
-        return self.autopilot.boot_s - began_s
-
-    def step(self) -> None:
-        if self.target is not None and self._steps % 12 == 0:
-            self.autopilot.set_position_setpoint(*self.target)
-        self.autopilot.step(STEP_S)
-        self._steps += 1
-        self.texts += [(self.autopilot.boot_s, text) for _, text in self.autopilot.drain_texts()]
-        if self.autopilot.mode is not self.modes[-1]:
-            self.modes.append(self.autopilot.mode)
-        if self.autopilot.landed is not self.landed[-1]:
-            self.landed.append(self.autopilot.landed)
-
-    def heard(self, text: str) -> float:
-        """When `text` was first said [s, boot]."""
-        return next(at_s for at_s, said in self.texts if said == text)
-
-    def has_heard(self, text: str) -> bool:
-        return any(said == text for _, said in self.texts)
-
-    def take_off(self) -> None:
-        self.run_until(lambda: self.autopilot.commander.is_armable)
-        assert self.autopilot.arm() is Answer.ACCEPTED
-        assert self.autopilot.takeoff() is Answer.ACCEPTED
-        self.run_until(lambda: self.autopilot.mode is Mode.LOITER)
-        self.run(2.0)
-
-    def go_offboard(self, north_m: float = 0.0, east_m: float = 0.0) -> None:
-        n, e, d = self.autopilot.estimate.position_m
-        self.target = (n + north_m, e + east_m, d, euler_of(self.autopilot.estimate.quaternion)[2])
-        self.autopilot.set_position_setpoint(*self.target)
-        assert self.autopilot.set_mode(Mode.OFFBOARD) is Answer.ACCEPTED
-
+from tests.sitl.simulated_flight import STEP_S, Flight
 
 # --- arming ---
 
@@ -354,8 +295,9 @@ def test_return_from_close_by_flies_home_as_high_as_it_is_and_lands() -> None:
     flight.target = None
     assert flight.autopilot.set_mode(Mode.RTL) is Answer.ACCEPTED
     flight.run_until(lambda: flight.autopilot.landed is Landed.LANDING)
-    assert math.hypot(*flight.autopilot.vehicle.position_m[:2]) < 1.5
+    assert math.hypot(*flight.autopilot.vehicle.position_m[:2]) < 2.5
     flight.run_until(lambda: not flight.autopilot.is_armed)
+    assert math.hypot(*flight.autopilot.vehicle.position_m[:2]) < 1.0
     texts = [text for _, text in flight.texts]
     assert any(text.startswith("RTL: start return at 49") and "(8 m above destination)" in text for text in texts)
     assert texts[-3:] == ["RTL: land at destination", "Landing detected", "Disarmed by landing"]

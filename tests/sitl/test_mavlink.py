@@ -12,7 +12,8 @@ from pymavlink.dialects.v20 import all as dialect
 
 from sitl.autopilot import SimAutopilot
 from sitl.mavlink import MavlinkFace
-from sitl.modes import Mode
+from sitl.modes import Mode, Severity
+from sitl.udp import UdpLink
 
 STEP_S = 0.004
 ACCEPTED, REJECTED, DENIED, UNSUPPORTED = 0, 1, 2, 3
@@ -56,10 +57,16 @@ class Link:
             self.app = Station()
             self.autopilot = SimAutopilot(seed=2)
             try:
-                self.face = MavlinkFace(self.autopilot, self.app.port)
+                self.face = UdpLink(MavlinkFace(self.autopilot), self.app.port)
                 break
             except OSError:
                 self.app.socket.close()
+
+        self._beat_s = 0.0
+
+    def beat(self) -> None:
+        """Send a ground station's heartbeat."""
+        self.app.send(self.app.mavlink.heartbeat_encode(dialect.MAV_TYPE_GCS, 8, 0, 0, 0), self.port)
 
     @property
     def port(self) -> int:
@@ -67,6 +74,9 @@ class Link:
 
     def run(self, time_s: float) -> None:
         for _ in range(round(time_s / STEP_S)):
+            if self.autopilot.boot_s >= self._beat_s:
+                self._beat_s += 1.0
+                self.beat()
             self.autopilot.step(STEP_S)
             self.face.service()
             self.app.listen()
@@ -202,6 +212,7 @@ def test_setpoints_in_another_frame_are_refused_and_said_so_once(link: Link) -> 
         link.app.send(setpoint_message(link, 2552, 0.0, frame=8), link.port)
         link.run(0.05)
     assert not link.autopilot.has_seen_setpoints
+    link.run(2.0)
     assert ["frame 8" in text.text for text in link.app.of("STATUSTEXT") if text.chunk_seq == 0] == [True]
 
 
@@ -315,7 +326,7 @@ def test_parameters_are_written_in_their_type_only(link: Link) -> None:
     link.app.send(link.app.mavlink.param_set_encode(1, 1, b"COM_OF_LOSS_T", as_float, 6), link.port)
     link.run(0.02)
     written = [message.param_id for message in link.app.of("PARAM_VALUE")]
-    assert written == ["COM_OBL_RC_ACT", "MIS_TAKEOFF_ALT"]
+    assert written == ["COM_OBL_RC_ACT", "MIS_TAKEOFF_ALT"] * 2  # the answer, and the news of the change
     get = link.autopilot.parameters.get
     assert (get("COM_OBL_RC_ACT"), get("MIS_TAKEOFF_ALT"), get("COM_OF_LOSS_T")) == (3.0, 12.0, 1.0)
 
@@ -326,6 +337,7 @@ def test_a_parameter_out_of_range_is_answered_with_the_old_value(link: Link, val
     link.run(0.02)
     (answer,) = link.app.of("PARAM_VALUE")
     assert (answer.param_id, answer.param_value) == ("MPC_TKO_RAMP_T", 3.0)
+    link.run(2.6)
     assert link.app.of("STATUSTEXT")[0].text.startswith("Refused: parameter MPC_TKO_RAMP_T")
 
 
@@ -339,6 +351,7 @@ def test_the_whole_list_of_parameters_is_sent(link: Link) -> None:
 def test_long_texts_come_in_chunks_and_end_in_a_tab(link: Link) -> None:
     link.run(1.0)
     assert link.command(400, 1.0) == [REJECTED]
+    link.run(1.5)
     texts = link.app.of("STATUSTEXT")
     assert [(text.text, text.chunk_seq) for text in texts] == [
         ("Arming denied: Resolve system health failures firs", 0),
@@ -380,9 +393,42 @@ def test_garbage_is_survived(link: Link) -> None:
 
 def test_a_taken_port_is_told_in_a_sentence(link: Link) -> None:
     with pytest.raises(OSError, match="choose another port"):
-        MavlinkFace(SimAutopilot(), link.app.port)
+        UdpLink(MavlinkFace(SimAutopilot()), link.app.port)
 
 
 def test_a_port_without_one_40_above_is_told_in_a_sentence() -> None:
     with pytest.raises(OSError, match="choose a port up to 65495"):
-        MavlinkFace(SimAutopilot(), 65500)
+        UdpLink(MavlinkFace(SimAutopilot()), 65500)
+
+
+def test_texts_wait_for_a_ground_station_and_old_ones_are_lost(link: Link) -> None:
+    link.run(4.0)
+    link.beat = lambda: None  # type: ignore[method-assign]
+    link.run(3.0)
+    for number in range(20):
+        link.autopilot.say(Severity.INFO, f"text {number}")
+    link.run(1.0)
+    assert link.app.of("STATUSTEXT") == []
+    del link.beat
+    link.beat()
+    link.run(0.1)
+    assert [text.text for text in link.app.of("STATUSTEXT")] == [f"text {number}\t" for number in range(12, 20)]
+
+
+def test_sticks_come_by_manual_control(link: Link) -> None:
+    link.run(1.0)
+    link.app.send(link.app.mavlink.manual_control_encode(1, 600, -300, 500, 100, 0), link.port)
+    link.run(0.1)
+    sticks = link.autopilot.sticks
+    assert sticks is not None
+    assert (sticks.pitch, sticks.roll, sticks.throttle, sticks.yaw) == (0.6, -0.3, 0.5, 0.1)
+    link.run(1.0)
+    assert link.autopilot.sticks is None
+
+
+def test_a_battery_failure_can_be_injected(link: Link) -> None:
+    link.run(1.0)
+    assert link.command(420, 100, 1, 0) == [ACCEPTED]
+    link.run(3.0)
+    assert link.autopilot.battery.remaining < 0.1
+    assert link.command(420, 1, 1, 0) == [UNSUPPORTED]

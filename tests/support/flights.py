@@ -9,10 +9,14 @@ from typing import Any
 
 from mission.autopilot import Setpoint
 from mission.camera_plan import pinhole_intrinsics
-from mission.executive import Executive
+from mission.executive import Crew, Executive
+from mission.hazards import ComputerView
+from mission.journal import Journal, NoJournal
+from mission.logbook import FlightPapers, Logbook
 from mission.plan import MissionPlan
 from mission.plan_file import read_mission
 from mission.records import Event, MissionEnded, TaskEnded, TaskStarted
+from mission.resumption import Resumption
 from tests.support.geometric_eyes import GeometricEyes
 from tests.support.in_process import InProcessAutopilot
 from tests.support.virtual_time import VirtualClock, run_virtually
@@ -73,17 +77,36 @@ class Flown:
 
 
 @dataclass
+class Computer:
+    """The companion computer as a test wants it."""
+
+    view: ComputerView = field(default_factory=ComputerView)
+
+
+@dataclass
 class Cockpit:
     """What a test may touch while the flight goes on."""
 
     executive: Executive
     autopilot: InProcessAutopilot
     eyes: GeometricEyes
+    computer: Computer
+
+
+PAPERS = FlightPapers("test", "test.yaml", "00", "in-process", "geometric", "none")
 
 
 def shipped(name: str) -> MissionPlan:
     """The plan of a shipped mission."""
     return read_mission(MISSIONS / f"{name}.yaml").plan
+
+
+def bare_executive(plan: MissionPlan, autopilot: InProcessAutopilot, clock: VirtualClock) -> Executive:
+    """An executive over a vehicle that somebody else has made, with eyes and no log or journal."""
+    camera = pinhole_intrinsics(plan.camera)
+    eyes = GeometricEyes(autopilot, clock, camera, LINE_POINT_NED_M, LINE_HEADING_RAD)
+    logbook = Logbook(NoJournal(), PAPERS)
+    return Executive(plan, Crew(autopilot, eyes, camera, KeptLog(lambda _: None), logbook, ComputerView), clock)
 
 
 def fly(
@@ -94,6 +117,8 @@ def fly(
     in_task: str | None = None,
     after_s: float = 0.5,
     do: Callable[[Cockpit], None] | None = None,
+    journal: Journal | None = None,
+    resumption: Resumption | None = None,
 ) -> Flown:
     """Fly a plan to its end. `do` is called once, `after_s` into the first task named `in_task`."""
 
@@ -102,6 +127,7 @@ def fly(
         autopilot = InProcessAutopilot(clock, start_yaw_rad=START_YAW_RAD, wind_m_s=wind_m_s, seed=seed)
         camera = pinhole_intrinsics(plan.camera)
         eyes = GeometricEyes(autopilot, clock, camera, LINE_POINT_NED_M, LINE_HEADING_RAD)
+        computer = Computer()
         loop = asyncio.get_running_loop()
         has_done = False
 
@@ -109,10 +135,11 @@ def fly(
             nonlocal has_done
             if isinstance(item, TaskStarted) and item.task == in_task and do is not None and not has_done:
                 has_done = True
-                loop.call_later(after_s, do, Cockpit(executive, autopilot, eyes))
+                loop.call_later(after_s, do, Cockpit(executive, autopilot, eyes, computer))
 
         log = KeptLog(on_record)
-        executive = Executive(plan, autopilot, eyes, log, clock, camera)
+        crew = Crew(autopilot, eyes, camera, log, Logbook(journal or NoJournal(), PAPERS), lambda: computer.view)
+        executive = Executive(plan, crew, clock, resumption)
         ended = await executive.run()
         if in_task is not None:
             assert has_done, f"the flight never came to {in_task}"

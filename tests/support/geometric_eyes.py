@@ -65,7 +65,10 @@ def bare_report(seq: int, t_capture_ns: int, estimate: LineEstimate | None, late
 
 
 class GeometricEyes:
-    """mission.eyes.Eyes over a straight line. `is_blind` shows nothing, `failure` is a dead worker."""
+    """mission.eyes.Eyes over a straight line. `is_blind` shows no line, `is_silent` sends no report.
+
+    `failure` is a dead worker, `impairment` a camera that is gone or blind.
+    """
 
     def __init__(
         self,
@@ -84,14 +87,16 @@ class GeometricEyes:
         self._seq = 0
         self._pending: list[VisionReport] = []
         self.is_blind = False
+        self.is_silent = False
         self.failure: str | None = None
         self.missing: str | None = None
+        self.impairment: Notice | None = None
 
     def take(self) -> list[VisionReport]:
         """Look whenever a frame is due; hand it over when its latency has passed."""
         now_ns = self._clock.now_ns()
         self._autopilot.catch_up()
-        if now_ns >= self._next_ns and self.failure is None:
+        if now_ns >= self._next_ns and self.failure is None and not self.is_silent:
             self._next_ns = now_ns + FRAME_PERIOD_NS
             vehicle = self._autopilot.sim.vehicle
             estimate = None

@@ -5,12 +5,14 @@ It shows what MAVLink would: mode and armed state are told once a second, as PX4
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 from drivers.clock import Clock
 from mission.autopilot import (
     AutopilotError,
     AutopilotKind,
     FlightMode,
+    GlobalPoint,
     Identity,
     LandedState,
     NoAnswerError,
@@ -50,7 +52,17 @@ class InProcessAutopilot:
         )
         self._heartbeat: tuple[Mode, bool] = (self.sim.mode, False)
         self._heartbeat_s = 0.0
+        self._heartbeat_failsafe = False
+        self._target: Setpoint | None = None
+        self._target_s = 0.0
         self.is_connected = True
+        self.hears_us = True
+        """Whether what we send reaches the vehicle. Setpoints that do not are lost in silence, commands unanswered."""
+        self.tells_us = True
+        """Whether telemetry comes; without it the last state stays."""
+        self.after_step: list[Callable[[], None]] = []
+        """Called after each step of the vehicle."""
+        self._last_state: VehicleState | None = None
         self.commands: list[str] = []
         self.n_setpoints = 0
         self._setpoint: tuple[float, float, float, float] | None = None
@@ -64,26 +76,43 @@ class InProcessAutopilot:
         while self.sim.boot_s + _STEP_S <= now_s:
             self.sim.step(_STEP_S)
             self._repeat_setpoint()
+            for act in self.after_step:
+                act()
             if self.sim.boot_s - self._heartbeat_s >= 1.0:
                 self._heartbeat_s += 1.0
                 self._heartbeat = (self.sim.mode, self.sim.is_armed)
+                self._heartbeat_failsafe = self.sim.failsafe is not None
+            if self.sim.boot_s - self._target_s >= 0.1:
+                self._target_s = self.sim.boot_s
+                self._tell_target()
+
+    def _tell_target(self) -> None:
+        """POSITION_TARGET_LOCAL_NED, ten times a second."""
+        setpoint = self.sim.setpoint
+        if setpoint is not None and None not in setpoint.position_m:
+            self._target = Setpoint(*setpoint.position_m, setpoint.yaw_rad)
 
     def _repeat_setpoint(self) -> None:
         """MAVSDK's own thread repeats the last setpoint, until a heartbeat says that the mode is another."""
         if self._heartbeat[0] is not Mode.OFFBOARD and self._was_offboard:
             self._setpoint = None
         self._was_offboard = self._heartbeat[0] is Mode.OFFBOARD
-        if self._setpoint is not None:
+        if self._setpoint is not None and self.hears_us:
             self.sim.set_position_setpoint(*self._setpoint)
 
     @property
     def state(self) -> VehicleState | None:
         self.catch_up()
+        if self.tells_us or self._last_state is None:
+            self._last_state = self._state_now()
+        return replace(self._last_state, is_connected=self.is_connected)
+
+    def _state_now(self) -> VehicleState:
         estimate = self.sim.estimate
         roll_rad, pitch_rad, yaw_rad = euler_of(estimate.quaternion)
         mode, is_armed = self._heartbeat
         return VehicleState(
-            self._clock.now_ns() if self.is_connected else 0,
+            self._clock.now_ns(),
             *estimate.position_m,
             *estimate.velocity_m_s,
             roll_rad,
@@ -94,8 +123,18 @@ class InProcessAutopilot:
             _LANDED[self.sim.landed],
             self.sim.battery.remaining,
             self.is_connected,
-            self._has_position,
+            is_failsafe=self._heartbeat_failsafe,
+            is_position_ok=self.sim.is_position_ok,
         )
+
+    @property
+    def target(self) -> Setpoint | None:
+        self.catch_up()
+        return self._target
+
+    async def read_origin(self) -> GlobalPoint | None:
+        origin = self.sim.origin
+        return GlobalPoint(*origin.global_of((0.0, 0.0, 0.0)))
 
     def drain_status_texts(self) -> list[str]:
         return [text for _, text in self.sim.drain_texts()]
@@ -105,11 +144,7 @@ class InProcessAutopilot:
 
     def missing_health(self) -> list[str]:
         self.catch_up()
-        return [] if self._has_position else ["global position (GPS)"]
-
-    @property
-    def _has_position(self) -> bool:
-        return self.sim.boot_s > 5.0
+        return [] if self.sim.boot_s > 5.0 else ["global position (GPS)"]
 
     async def identify(self) -> Identity:
         return Identity(AutopilotKind.PX4, "1.16.1", "00000000000000000000000000000001")
@@ -138,7 +173,8 @@ class InProcessAutopilot:
             raise NoAnswerError(f"the setpoint was {faults.pop(0)}")
         self.n_setpoints += 1
         self._setpoint = (setpoint.north_m, setpoint.east_m, setpoint.down_m, setpoint.yaw_rad)
-        self.sim.set_position_setpoint(*self._setpoint)
+        if self.hears_us:
+            self.sim.set_position_setpoint(*self._setpoint)
 
     async def hold(self) -> None:
         self._command("hold", lambda: self.sim.set_mode(Mode.LOITER))
@@ -157,6 +193,8 @@ class InProcessAutopilot:
         self.commands.append(name)
         faults = self.faults.get(name, [])
         fault = faults.pop(0) if faults else None
+        if not self.hears_us:
+            raise NoAnswerError(f"the autopilot did not answer when asked to {name}")
         if fault == "refused":
             raise AutopilotError(f"the autopilot refused to {name}: denied")
         if fault == "ignored":

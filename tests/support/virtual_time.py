@@ -32,6 +32,10 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
     def time(self) -> float:
         return self._jumping.now_s
 
+    def block(self, wall_s: float) -> None:
+        """Let time pass as if the callback that calls this took so long."""
+        self._jumping.now_s += wall_s
+
 
 class VirtualClock:
     """The flight's clock on the running virtual loop."""
