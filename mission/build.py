@@ -48,8 +48,6 @@ def guidance_settings(plan: p.GuidancePlan) -> GuidanceSettings:
 def safety_limits(plan: p.SafetyPlan) -> SafetyLimits:
     """The safety section in the program's units."""
     return SafetyLimits(
-        max_distance_m=plan.max_distance_m,
-        max_altitude_m=plan.max_altitude_m,
         line_lost_s=plan.line_lost_s,
         estimate_stale_s=plan.estimate_stale_s,
         telemetry_stale_s=plan.telemetry_stale_s,

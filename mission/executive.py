@@ -13,7 +13,15 @@ from drivers.camera.camera import Intrinsics
 from drivers.clock import NS_PER_S, Clock
 from mission import machine as m
 from mission.autopilot import Autopilot, AutopilotError, Setpoint, VehicleState
-from mission.build import build_task, guidance_settings, reactions, safety_limits, search_settings, setpoint_limits
+from mission.build import (
+    build_task,
+    fence,
+    guidance_settings,
+    reactions,
+    safety_limits,
+    search_settings,
+    setpoint_limits,
+)
 from mission.checks import Check
 from mission.detours import Detour, detour_task
 from mission.eyes import Eyes
@@ -93,7 +101,7 @@ class Executive:
         self._search = search_settings(plan.safety)
         self._machine = m.FlightMachine([task.task for task in plan.tasks], self._before_change, self._after_change)
         self._situation = Situation(
-            crew.autopilot, crew.eyes, crew.log, clock, crew.camera, self._guidance, crew.computer
+            crew.autopilot, crew.eyes, crew.log, clock, crew.camera, self._guidance, fence(plan.safety), crew.computer
         )
         self._helm = Helm(crew.autopilot, crew.log, clock, setpoint_limits(plan))
         self._task: Task | None = None

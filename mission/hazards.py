@@ -11,10 +11,8 @@ from mission.safety import PRIORITY, Hazard
 
 @dataclass(frozen=True, slots=True)
 class SafetyLimits:
-    """The limits that the observation is held against; distances from the take-off point, battery 0 to 1."""
+    """The limits that the observation is held against; battery 0 to 1."""
 
-    max_distance_m: float
-    max_altitude_m: float
     line_lost_s: float
     estimate_stale_s: float
     telemetry_stale_s: float
@@ -78,11 +76,12 @@ class TaskView:
 
 @dataclass(frozen=True, slots=True)
 class SafetyInput:
-    """What safety looks at in one tick. Distances are from the take-off point, times are flight time.
+    """What safety looks at in one tick. Times are flight time.
 
     `was_armed` says that the vehicle was seen armed in this flight, `position_bad_s` for how long its position has been
-    bad. `foreign_setpoint` (the autopilot flies another's), `tracking` (it does not follow ours), `refusal` (of a
-    command, by the autopilot), `unsafe_setpoint` (not sent) and `internal_error` are sentences, None where all is well.
+    bad. `fence_breach`, `foreign_setpoint` (the autopilot flies another's), `tracking` (it does not follow ours),
+    `refusal` (of a command, by the autopilot), `unsafe_setpoint` (not sent) and `internal_error` are sentences, None
+    where all is well.
     """
 
     now_ns: int
@@ -92,8 +91,7 @@ class SafetyInput:
     eyes: EyesView
     computer: ComputerView
     pace: PaceView
-    distance_m: float
-    altitude_m: float
+    fence_breach: str | None
     was_armed: bool
     position_bad_s: float
     foreign_setpoint: str | None
@@ -103,6 +101,9 @@ class SafetyInput:
     internal_error: str | None
     is_interrupted: bool
 
+
+LANDED_M_S = 1.5
+"""What moves faster up or down than this has not landed."""
 
 LATE_TICK_S = 0.25
 """A control tick that comes later than this [s, wall] is told."""
@@ -135,7 +136,8 @@ def find_hazards(seen: SafetyInput, limits: SafetyLimits) -> dict[Hazard, str]:
 
 def _of_modes(seen: SafetyInput) -> dict[Hazard, str]:
     state, modes = seen.state, seen.modes
-    is_down = seen.task.is_going_down and state.landed is LandedState.ON_GROUND
+    # PX4 calls a vehicle landed as soon as it is disarmed, one that falls too.
+    is_down = seen.task.is_going_down and state.landed is LandedState.ON_GROUND and abs(state.v_down_m_s) < LANDED_M_S
     if seen.was_armed and not state.is_armed and not is_down:
         return {Hazard.DISARMED: "the vehicle was disarmed before it had landed"}
     if state.mode in modes.explained:
@@ -160,12 +162,8 @@ def _of_place(seen: SafetyInput, limits: SafetyLimits) -> dict[Hazard, str]:
     if seen.task.is_going_down:
         return {}  # the autopilot chooses its own way home, and RTL_RETURN_ALT may lie above the fence
     found: dict[Hazard, str] = {}
-    if seen.distance_m > limits.max_distance_m:
-        found[Hazard.GEOFENCE] = (
-            f"{seen.distance_m:.0f} m from the take-off point, allowed are {limits.max_distance_m:g} m"
-        )
-    elif seen.altitude_m > limits.max_altitude_m:
-        found[Hazard.GEOFENCE] = f"{seen.altitude_m:.0f} m high, allowed are {limits.max_altitude_m:g} m"
+    if seen.fence_breach is not None:
+        found[Hazard.GEOFENCE] = seen.fence_breach
     if seen.position_bad_s > limits.position_bad_s:
         found[Hazard.POSITION_BAD] = f"the autopilot has had no good position for {seen.position_bad_s:.1f} s"
     if seen.tracking is not None:

@@ -26,6 +26,7 @@ NAMES = (
     "GF_MAX_HOR_DIST",
     "GF_MAX_VER_DIST",
     "COM_LOW_BAT_ACT",
+    "NAV_DLL_ACT",
 )
 """The PX4 parameters that `check_parameters` looks at."""
 
@@ -41,6 +42,7 @@ _LOSS_ACTIONS = {
     7: "Disarm, which stops the motors",
 }
 _RETURN, _HOLD = 3, 5
+_STATION_RETURN = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -193,6 +195,22 @@ def _low_battery_action(parameters: Parameters, plan: MissionPlan, extent: Exten
     return passed(name, "with an empty battery the autopilot returns")
 
 
+def _station_loss_action(parameters: Parameters, plan: MissionPlan, extent: Extent) -> Check:
+    """Outside offboard nobody misses our setpoints; our heartbeat is what is left to miss."""
+    name = "station_loss_action"
+    action = parameters.get("NAV_DLL_ACT")
+    if action is None:
+        return _unknown(name, "NAV_DLL_ACT")
+    if round(action) == _STATION_RETURN:
+        return passed(name, "when our heartbeat stops the autopilot returns")
+    words = {
+        0: "without our heartbeat the autopilot hovers where it is until the battery is low",
+        1: "without our heartbeat the autopilot hovers where it is until the battery is low",
+        3: "without our heartbeat the autopilot lands where it is, that may be on the line",
+    }.get(round(action), "without our heartbeat the autopilot stops the motors")
+    return warning(name, f"NAV_DLL_ACT is {action:g}: {words}; set it to {_STATION_RETURN} (return)")
+
+
 _CHECKS: tuple[Callable[[Parameters, MissionPlan, Extent], Check], ...] = (
     _offboard_loss_time,
     _offboard_loss_action,
@@ -201,6 +219,7 @@ _CHECKS: tuple[Callable[[Parameters, MissionPlan, Extent], Check], ...] = (
     _speeds,
     _autopilot_fence,
     _low_battery_action,
+    _station_loss_action,
 )
 
 

@@ -8,6 +8,7 @@ from drivers.camera.camera import Intrinsics
 from drivers.clock import NS_PER_S, Clock
 from mission.autopilot import Autopilot, Setpoint, VehicleState
 from mission.eyes import Eyes, Lookout
+from mission.geofence import Fence, breach
 from mission.guidance import GuidanceSettings
 from mission.hazards import ComputerView, EyesView, SafetyInput, TaskView
 from mission.helm import Helm
@@ -44,12 +45,15 @@ class Situation:
         clock: Clock,
         camera: Intrinsics,
         guidance: GuidanceSettings,
+        fence: Fence,
         computer: Computer,
     ) -> None:
         self._autopilot = autopilot
         self._eyes = eyes
         self._log = log
         self._clock = clock
+        self._fence = fence
+        self._was_above = False
         self._computer = computer
         self._lookout = Lookout(eyes, log, camera, guidance)
         self._tracking_watch = TrackingWatch(guidance.leash_m)
@@ -104,6 +108,17 @@ class Situation:
         """The height above the take-off point [m]."""
         return self.memory.start.down_m - state.down_m
 
+    def _fence_breach(self, state: VehicleState, *, is_going_down: bool) -> str | None:
+        start, height_m, least_m = self.memory.start, self.height_m(state), self._fence.min_altitude_m
+        self._was_above = self._was_above or (least_m is not None and height_m > least_m)
+        return breach(
+            self._fence,
+            state.north_m - start.north_m,
+            state.east_m - start.east_m,
+            height_m,
+            is_min_in_force=self._was_above and not is_going_down,
+        )
+
     def safety_input(self, now_ns: int, state: VehicleState, helm: Helm, task: TaskView) -> SafetyInput:
         """All of it, as safety wants it."""
         eyes, troubles = self._eyes, self.troubles
@@ -123,8 +138,7 @@ class Situation:
             ),
             computer=self._computer(),
             pace=self.pace.view,
-            distance_m=self.from_start_m(state),
-            altitude_m=self.height_m(state),
+            fence_breach=self._fence_breach(state, is_going_down=task.is_going_down),
             was_armed=self.was_armed,
             position_bad_s=(now_ns - self._position_ok_ns) / NS_PER_S,
             foreign_setpoint=helm.targets.heard(

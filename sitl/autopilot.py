@@ -78,6 +78,7 @@ class SimAutopilot:
         self._task_key: object = None
         self._offboard_target: tuple[Vector, float] | None = None
         self._setpoint_s: float | None = None
+        self._station_s: float | None = None
         self._has_taken_off = False
         self._took_off_here = False
         self._takeoff_requests = 0
@@ -193,6 +194,10 @@ class SimAutopilot:
         self.commander.see_setpoint()
         if isinstance(self._task, Offboard):
             self._task.aim(*self._offboard_target)
+
+    def hear_station(self) -> None:
+        """A ground station's heartbeat came (HEARTBEAT of MAV_TYPE_GCS)."""
+        self._station_s = self.boot_s
 
     def set_sticks(self, pitch: float, roll: float, throttle: float, yaw: float) -> None:
         """Take a pilot's sticks (MANUAL_CONTROL): pitch forward, roll and yaw right -1 to 1, throttle 0 to 1.
@@ -374,6 +379,7 @@ class SimAutopilot:
         return Observation(
             boot_s=self.boot_s,
             setpoint_age_s=None if self._setpoint_s is None else self.boot_s - self._setpoint_s,
+            station_age_s=None if self._station_s is None else self.boot_s - self._station_s,
             is_landed=self._land_detector.is_landed,
             landed_s=self._land_detector.landed_s,
             has_taken_off=self._has_taken_off,

@@ -15,6 +15,7 @@ Say = Callable[[Severity, str], None]
 
 _TEXT_GAP_S = 2.1  # PX4's health report, and with it the arming checks, follow at most this often
 _FENCE_ACTIONS = {2: Mode.LOITER, 3: Mode.RTL, 5: Mode.LAND}  # GF_ACTION; 4, terminate, is not modelled
+_STATION_ACTIONS = {1: Mode.LOITER, 2: Mode.RTL, 3: Mode.LAND}  # NAV_DLL_ACT
 _STICKS_ACTIONS = {1: Mode.LOITER, 2: Mode.RTL}  # NAV_RCL_ACT; all else lands
 _OFFBOARD_ACTIONS = {3: Mode.RTL, 4: Mode.LAND, 5: Mode.LOITER}  # COM_OBL_RC_ACT; the others need sticks
 
@@ -24,6 +25,7 @@ class Failsafe(enum.Enum):
 
     OFFBOARD_LOSS = "offboard loss"
     POSITION_LOSS = "position loss"
+    STATION_LOSS = "station loss"
     STICKS_LOSS = "sticks loss"
     FENCE = "fence"
     BATTERY = "battery"
@@ -43,7 +45,8 @@ class Observation:
     """What the commander looks at: boot time [s], age of the newest offboard setpoint [s] (None: never one), and so on.
 
     `is_landed` is the land detector's word, `landed_s` for how long, `has_taken_off` since arming; `battery` is 0 to 1;
-    `distance_m` and `height_m` are from home (0 without one).
+    `distance_m` and `height_m` are from home (0 without one). `station_age_s` is the age of the newest heartbeat of a
+    ground station, None before the first.
     """
 
     boot_s: float = 0.0
@@ -57,6 +60,7 @@ class Observation:
     is_stick_moving: bool = False
     distance_m: float = 0.0
     height_m: float = 0.0
+    station_age_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -82,12 +86,14 @@ class Failsafes:
         self._has_left_fence = False
         self._sticks_mode: Mode | None = None
         self._are_sticks_needed = False
+        self._station_mode: Mode | None = None
+        self._is_station_lost = False
         self._hold_until_s: float | None = None
         self._active: Reaction | None = None
 
     def release(self) -> None:
         """A person changed the mode, or the motors were disarmed: that ends every latched reaction."""
-        self._battery_mode = self._fence_mode = self._sticks_mode = None
+        self._battery_mode = self._fence_mode = self._sticks_mode = self._station_mode = None
         self._hold_until_s = None
         self._active = None
         self._are_sticks_needed = False
@@ -101,6 +107,7 @@ class Failsafes:
             return None
         self._watch_fence(seen)
         self._watch_sticks(seen, intended)
+        self._watch_station(seen)
         self._end_hold(seen)
         reaction = self._gravest(intended, seen, is_offboard_available=is_offboard_available)
         if reaction is not None and self._active is None and self._hold_until_s is None:
@@ -116,6 +123,7 @@ class Failsafes:
         for cause, mode in (
             (Failsafe.BATTERY, self._battery_mode),
             (Failsafe.STICKS_LOSS, self._sticks_mode),
+            (Failsafe.STATION_LOSS, self._station_mode),
             (Failsafe.FENCE, self._fence_mode),
         ):
             if mode is not None:
@@ -147,6 +155,8 @@ class Failsafes:
         self._announce()
         if self._battery_mode is not None:
             self._battery_mode = Mode.LAND if self.warning is BatteryWarning.EMERGENCY else Mode.RTL
+        if self._station_mode is not None:
+            self._station_mode = _STATION_ACTIONS.get(int(self._parameters.get("NAV_DLL_ACT")), Mode.RTL)
         if self._sticks_mode is not None:
             self._sticks_mode = _STICKS_ACTIONS.get(int(self._parameters.get("NAV_RCL_ACT")), Mode.LAND)
 
@@ -183,6 +193,17 @@ class Failsafes:
             if not int(self._parameters.get("COM_RCL_EXCEPT")) & bit:
                 self._sticks_mode = Mode.LOITER
                 self._hold(seen)
+
+    def _watch_station(self, seen: Observation) -> None:
+        """The heartbeats of ground stations (COM_DL_LOSS_T), by NAV_DLL_ACT after a Hold; heard again, it is over."""
+        action = _STATION_ACTIONS.get(int(self._parameters.get("NAV_DLL_ACT")))
+        is_lost = seen.station_age_s is not None and seen.station_age_s > self._parameters.get("COM_DL_LOSS_T")
+        if is_lost and not self._is_station_lost and action is not None:
+            self._station_mode = Mode.LOITER
+            self._hold(seen)
+        elif not is_lost and self._station_mode is not None:
+            self._station_mode = self._hold_until_s = None
+        self._is_station_lost = is_lost
 
     def _watch_battery(self, seen: Observation, *, is_flying: bool) -> None:
         """PX4's three battery levels (BAT_LOW_THR, BAT_CRIT_THR, BAT_EMERGEN_THR), by COM_LOW_BAT_ACT."""

@@ -163,8 +163,8 @@ def _flicker_gps(cockpit: Cockpit) -> None:
 
 
 def _shrink_fence(cockpit: Cockpit) -> None:
-    executive = cockpit.executive
-    executive._limits = replace(executive._limits, max_altitude_m=0.5)
+    situation = cockpit.executive._situation
+    situation._fence = replace(situation._fence, max_altitude_m=0.5)
 
 
 def _gale(cockpit: Cockpit) -> None:

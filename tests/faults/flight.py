@@ -9,7 +9,7 @@ from sitl.autopilot import SimAutopilot
 from sitl.modes import Mode
 from tests.faults.faults import FAULTS, Fault
 from tests.faults.table import End
-from tests.support.flights import LINE_HEADING_RAD, LINE_POINT_NED_M, Cockpit, fly
+from tests.support.flights import LINE_HEADING_RAD, LINE_POINT_NED_M, Cockpit, Flown, fly
 from tests.support.in_process import InProcessAutopilot
 
 TAKEOFF = {"task": "takeoff", "altitude_m": 4.0}
@@ -30,6 +30,8 @@ TASK_PLANS: dict[str, list[dict[str, object]]] = {
     "land": [TAKEOFF, UP, {"task": "land"}],
 }
 CLEARANCE_M = 2.0
+HOME_M = 3.0
+_PILOTS_MODES = (Mode.LOITER, Mode.RTL, Mode.LAND, Mode.POSCTL)
 _AFTER_S = {"takeoff": 5.0, "return": 4.0, "land": 4.0}
 _AFTERWARDS_S = 150.0
 _SAY_FOR_S = 1.2  # a takeover shows with the next heartbeat
@@ -98,7 +100,7 @@ def fly_case(fault_name: str, task: str) -> Flight:
     watchdog = Watchdog(fault)
     flown = fly(plan, in_task=task, after_s=_AFTER_S.get(task, 0.7), do=watchdog.strike)
     sim = flown.autopilot.sim
-    mode_at_end, failsafe_at_end = sim.mode, sim.failsafe
+    mode_at_end, was_in_failsafe = sim.mode, sim.failsafe is not None
     # The executive is gone, and so is its stream.
     flown.autopilot._setpoint = None
     for _ in range(round(_AFTERWARDS_S / _STEP_S)):
@@ -106,23 +108,22 @@ def fly_case(fault_name: str, task: str) -> Flight:
             break
         sim.step(_STEP_S)
         watchdog.look()
-    end = _end_of(
-        flown.ended.result, sim, mode_at_end, is_failsafe=failsafe_at_end is not None or sim.failsafe is not None
-    )
+    end = _end_of(flown, fault, mode_at_end, was_in_failsafe=was_in_failsafe)
     tasks = [item.task for item in flown.of(TaskStarted)]
     return Flight(end, [*flown.story, f"then {sim.mode.title}, after {tasks[-1]}"], watchdog.broken)
 
 
-def _end_of(result: Result, sim: SimAutopilot, mode_at_end: Mode, *, is_failsafe: bool) -> End:
+def _end_of(flown: Flown, fault: Fault, mode_at_end: Mode, *, was_in_failsafe: bool) -> End:
+    sim, result = flown.autopilot.sim, flown.ended.result
     is_down = not sim.is_armed and sim.vehicle.is_on_ground
-    n, e, _ = sim.vehicle.position_m
-    is_home = math.hypot(n, e) < 3.0
-    if result is Result.COMPLETED:
-        return End.COMPLETED if is_down else End.LOST
-    if result is Result.TAKEN_OVER and not is_failsafe and not is_down:
-        return End.PILOT
-    if result is Result.TAKEN_OVER and mode_at_end in (Mode.LAND, Mode.RTL) and not is_failsafe:
-        return End.PILOT
+    if fault.is_takeover and result is not Result.COMPLETED:
+        is_theirs = not was_in_failsafe and (is_down or mode_at_end in _PILOTS_MODES)
+        return End.PILOT if is_theirs else End.LOST
     if not is_down:
         return End.LOST
-    return End.HOME if is_home else End.DOWN
+    n, e, _ = sim.vehicle.position_m
+    if math.hypot(n, e) > HOME_M:
+        return End.ELSEWHERE
+    if result is not Result.COMPLETED:
+        return End.HOME
+    return End.PAUSED if any("-> hold" in line or "-> search" in line for line in flown.story) else End.COMPLETED

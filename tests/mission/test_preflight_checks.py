@@ -9,14 +9,17 @@ import pytest
 from mission.autopilot import AutopilotError, AutopilotKind, FlightMode, Identity, LandedState, VehicleState
 from mission.camera_plan import pinhole_intrinsics
 from mission.checks import Check
-from mission.executive import Executive
+from mission.executive import Crew, Executive
+from mission.hazards import ComputerView
+from mission.journal import NoJournal
+from mission.logbook import Logbook
 from mission.offline_checks import check_offline
 from mission.plan import VehiclePlan
 from mission.preflight import wait_until_ready
 from mission.preflight_checks import Facts, check_all
 from mission.records import CheckResult, MissionEnded, PreflightCheck, Result
 from tests.mission.test_parameter_checks import GOOD
-from tests.support.flights import LINE_HEADING_RAD, LINE_POINT_NED_M, KeptLog, shipped
+from tests.support.flights import LINE_HEADING_RAD, LINE_POINT_NED_M, PAPERS, KeptLog, shipped
 from tests.support.geometric_eyes import GeometricEyes
 from tests.support.in_process import InProcessAutopilot
 from tests.support.virtual_time import VirtualClock, run_virtually

@@ -63,6 +63,7 @@ class InProcessAutopilot:
         self.after_step: list[Callable[[], None]] = []
         """Called after each step of the vehicle."""
         self._last_state: VehicleState | None = None
+        self._is_closed = False
         self.commands: list[str] = []
         self.n_setpoints = 0
         self._setpoint: tuple[float, float, float, float] | None = None
@@ -79,6 +80,8 @@ class InProcessAutopilot:
             for act in self.after_step:
                 act()
             if self.sim.boot_s - self._heartbeat_s >= 1.0:
+                if self.hears_us and not self._is_closed:
+                    self.sim.hear_station()  # MAVSDK's own heartbeat
                 self._heartbeat_s += 1.0
                 self._heartbeat = (self.sim.mode, self.sim.is_armed)
                 self._heartbeat_failsafe = self.sim.failsafe is not None
@@ -187,6 +190,7 @@ class InProcessAutopilot:
 
     async def close(self) -> None:
         self._setpoint = None
+        self._is_closed = True
 
     def _command(self, name: str, act: Callable[[], Answer]) -> None:
         self.catch_up()
