@@ -97,6 +97,7 @@ class MavsdkAutopilot:
         self._action: Any = None
         self._offboard: Any = None
         self._subscriptions: list[asyncio.Task[None]] = []
+        self._reading: asyncio.Task[float] | None = None
         self._telemetry: Any = None
         self._target: Setpoint | None = None
         self._newest: dict[str, Any] = {"connected": True, "battery": None, "failsafe": False}
@@ -223,8 +224,10 @@ class MavsdkAutopilot:
         param = ParamAsync(self._system)
         found: dict[str, float] = {}
         for name in names:
+            # Shielded, so that `close` can wait for the call in C when nobody else does any more.
+            self._reading = asyncio.create_task(_read(param, name))
             with contextlib.suppress(AutopilotError):
-                found[name] = await self._call(f"tell {name}", _read(param, name), PARAMETER_TIMEOUT_S)
+                found[name] = await self._call(f"tell {name}", asyncio.shield(self._reading), PARAMETER_TIMEOUT_S)
         return found
 
     async def arm(self) -> None:
@@ -264,6 +267,10 @@ class MavsdkAutopilot:
             subscription.cancel()
         await asyncio.gather(*self._subscriptions, return_exceptions=True)
         self._subscriptions = []
+        if self._reading is not None:  # in a thread of its own, which must not find MAVSDK destroyed
+            await asyncio.wait([self._reading], timeout=PARAMETER_TIMEOUT_S)
+            await asyncio.gather(self._reading, return_exceptions=True)
+            self._reading = None
         if self._mavsdk is not None:
             self._mavsdk.destroy()
             self._mavsdk = None

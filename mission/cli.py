@@ -223,26 +223,23 @@ def sitl(
 def check(
     mission: MissionArgument,
     diagram: Annotated[
-        bool, typer.Option("--diagram", help="Print the flight's state machine instead (Mermaid).")
+        bool, typer.Option("--diagram", help="Draw the flight's state machine instead (Mermaid).")
     ] = False,
 ) -> None:
     """Validate a mission file, explain it, and estimate its flight."""
     mission_file = _read_mission(mission)
     if diagram:
-        from mission.machine import FlightMachine
-        from mission.machine_drawing import mermaid
+        from mission.machine_drawing import draw_mission
 
-        typer.echo(mermaid(FlightMachine([task.task for task in mission_file.plan.tasks])), nl=False)
+        typer.echo(draw_mission(mission_file.plan), nl=False)
         return
     from rich.console import Console
 
-    from mission.estimate import total
     from mission.explain import print_plan
     from mission.offline_checks import check_offline
 
-    plan = mission_file.plan
-    checks = check_offline(plan)
-    print_plan(plan, total(plan), checks, Console())
+    checks = check_offline(mission_file.plan)
+    print_plan(mission_file.plan, checks, Console())
     if any(check.is_final for check in checks):
         _fail(f"{mission}: this mission is refused; see what failed above", EXIT_BAD_INPUT)
 

@@ -8,7 +8,7 @@ from rich.table import Table
 from rich.text import Text
 
 from mission.checks import Check
-from mission.estimate import FlightTotals, estimate_mission
+from mission.estimate import estimate_mission, total
 from mission.plan import CameraPlan, MissionPlan
 from mission.reach import reckon
 from mission.records import CheckResult
@@ -16,7 +16,7 @@ from mission.records import CheckResult
 _STYLES = {CheckResult.OK: "green", CheckResult.WARNING: "yellow", CheckResult.FAILED: "bold red"}
 
 
-def print_plan(plan: MissionPlan, totals: FlightTotals, checks: Sequence[Check], console: Console) -> None:
+def print_plan(plan: MissionPlan, checks: Sequence[Check], console: Console) -> None:
     """Print the mission as a table, with its sums and limits, then a line for each check."""
 
     def say(words: str | Text) -> None:
@@ -24,7 +24,7 @@ def print_plan(plan: MissionPlan, totals: FlightTotals, checks: Sequence[Check],
 
     say(f"[bold]{plan.name}[/bold]  {plan.description}")
     console.print(_task_table(plan))
-    safety = plan.safety
+    safety, totals = plan.safety, total(plan)
     say(f"about {totals.duration_s:.0f} s and {totals.distance_m:.0f} m over ground")
     say(_camera_words(plan.camera))
     say(

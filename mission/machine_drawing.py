@@ -3,11 +3,17 @@
 from collections.abc import Iterator
 
 from mission.machine import END_STATES, FlightMachine
+from mission.plan import MissionPlan
 
 _TASKS = "tasks"
 
 Edge = tuple[str, str, str]
 """Source, trigger, target."""
+
+
+def draw_mission(plan: MissionPlan) -> str:
+    """Draw the state machine that flies a mission."""
+    return mermaid(FlightMachine([task.task for task in plan.tasks]))
 
 
 def mermaid(machine: FlightMachine) -> str:

@@ -126,6 +126,7 @@ ParameterCheck = Literal[
     "speeds",
     "autopilot_fence",
     "low_battery_action",
+    "station_loss_action",
 ]
 """The pre-flight checks of the autopilot's parameters (mission/parameter_checks.py)."""
 

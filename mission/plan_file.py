@@ -34,7 +34,7 @@ class MissionFileError(Exception):
     def lines(self) -> list[str]:
         """`file:line: key: what is wrong`, one for each problem."""
         shown = [
-            ": ".join([f"{self.path}:{problem.line}", *filter(None, [problem.key]), problem.message])
+            f"{self.path}:" + _printable(": ".join([str(problem.line), *filter(None, [problem.key]), problem.message]))
             for problem in self.problems[:_MAX_SHOWN_PROBLEMS]
         ]
         n_hidden = len(self.problems) - _MAX_SHOWN_PROBLEMS
@@ -193,5 +193,13 @@ def _merge_alternatives(problems: list[Problem]) -> list[Problem]:
 def _show(value: object) -> str:
     if value is None:
         return "nothing"
-    text = json.dumps(value, default=str, ensure_ascii=False)
+    try:
+        text = json.dumps(value, default=str, ensure_ascii=False)
+    except (TypeError, ValueError):  # keys that JSON does not have: dates, bytes
+        text = str(value)
     return text if len(text) <= _MAX_SHOWN_CHARACTERS else text[:_MAX_SHOWN_CHARACTERS] + "…"
+
+
+def _printable(text: str) -> str:
+    """One line that every terminal can take: what a file holds may be line breaks, escapes or half characters."""
+    return "".join(letter if letter.isprintable() else letter.encode("unicode_escape").decode() for letter in text)

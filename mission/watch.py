@@ -61,12 +61,14 @@ class Watch:
 
     def _print_all(self) -> None:
         # EOFError: closed. OSError: the terminal is gone, and nobody watches any more.
-        with contextlib.suppress(EOFError, OSError), self._live or contextlib.nullcontext():
-            while True:
-                progress = self._news.get(_POLL_S)
-                self._print_checks()
-                if progress is not None:
-                    self._print(progress)
+        with contextlib.suppress(OSError), self._live or contextlib.nullcontext():
+            with contextlib.suppress(EOFError):
+                while True:
+                    progress = self._news.get(_POLL_S)
+                    self._print_checks()
+                    if progress is not None:
+                        self._print(progress)
+            self._print_checks()  # a flight that was refused ends right after they were told
 
     def _print_checks(self) -> None:
         while not self._checks.empty():

@@ -48,7 +48,7 @@ def key_path(location: Location) -> str:
 
 
 def parse_document(text: str) -> Document:
-    """Parse YAML. Raises DocumentError for bad YAML, aliases, a key that stands twice, and absurd nesting."""
+    """Parse YAML. Raises DocumentError for bad YAML, aliases, tags, a key that stands twice, and absurd nesting."""
     try:
         root = _compose(text)
         duplicates = [] if root is None else list(_duplicate_keys(root, ()))
@@ -65,17 +65,34 @@ def parse_document(text: str) -> Document:
         raise DocumentError([Problem(1, "", "nested too deeply to be a file that a person wrote")]) from None
 
 
-def _compose(text: str) -> yaml.Node | None:
-    """The node tree. Aliases are refused: a few of them can stand for gigabytes."""
-    for event in yaml.parse(text, Loader=yaml.SafeLoader):
+class _Loader(yaml.SafeLoader):
+    """Refuses what the reader of a mission must not meet."""
+
+    def compose_node(self, parent: yaml.Node | None, index: int) -> yaml.Node | None:
+        """Refuse aliases, a few of which can stand for gigabytes, and tags, which PyYAML does not always survive."""
+        event = self.peek_event()  # type: ignore[no-untyped-call]
         if isinstance(event, yaml.AliasEvent):
-            line = 1 if event.start_mark is None else event.start_mark.line + 1
-            raise DocumentError([Problem(line, "", "YAML aliases (*name) are not allowed; write it out")])
-    return yaml.compose(text, Loader=yaml.SafeLoader)
+            raise _refusal(event, "YAML aliases (*name) are not allowed; write it out")
+        if getattr(event, "tag", None) is not None:
+            raise _refusal(event, "YAML tags (!name) are not allowed; write the value alone")
+        return super().compose_node(parent, index)
+
+
+def _refusal(event: yaml.Event, words: str) -> DocumentError:
+    line = 1 if event.start_mark is None else event.start_mark.line + 1
+    return DocumentError([Problem(line, "", words)])
+
+
+def _compose(text: str) -> yaml.Node | None:
+    loader = _Loader(text)
+    try:
+        return loader.get_single_node()
+    finally:
+        loader.dispose()
 
 
 def _construct(root: yaml.Node | None) -> object:
-    loader = yaml.SafeLoader("")
+    loader = _Loader("")
     try:
         return None if root is None else loader.construct_document(root)
     finally:

@@ -2,8 +2,7 @@
 
 from pathlib import Path
 
-from mission.machine import FlightMachine
-from mission.machine_drawing import mermaid
+from mission.machine_drawing import draw_mission
 from mission.plan_file import read_mission
 
 ROOT = Path(__file__).parents[2]
@@ -13,8 +12,7 @@ MISSION = ROOT / "missions" / "first_follow.yaml"
 
 def page() -> str:
     """The page as the code says it should be."""
-    tasks = [task.task for task in read_mission(MISSION).plan.tasks]
-    drawing = mermaid(FlightMachine(tasks, lambda state: None))
+    drawing = draw_mission(read_mission(MISSION).plan)
     return f"""# The flight's state machine
 
 Drawn from the code (`mission/machine.py`) for `missions/first_follow.yaml`; `make diagram` draws it again, and

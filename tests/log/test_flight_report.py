@@ -17,8 +17,8 @@ from drivers.clock import NS_PER_S
 from mission.log.measures import line_fit_distances_m, nearest_on_axis, offboard_gaps_s
 from mission.log.reader import Flight, read_flight
 from mission.log.report import print_report
-from mission.log.summary import FlightReport, summarise, to_json
-from mission.records import Event, MissionEnded, Result, Severity, TaskEnded, TruePose
+from mission.log.summary import FlightReport, PreflightSummary, summarise, to_json
+from mission.records import CheckResult, Event, MissionEnded, PreflightCheck, Result, Severity, TaskEnded, TruePose
 from tests.log.synthetic_flight import START_NS, SWAY_M, TASKS, fly, write_log
 from vision.records import Track, Trouble
 
@@ -236,6 +236,24 @@ def test_trouble_comes_first(flight: Flight) -> None:
     assert text.index("Events") < text.index("Tasks")
     assert "No [line] for 2 s." in text
     assert "hold" in text
+
+
+def test_what_preflight_found_is_told_when_it_was_not_fine(tmp_path: Path) -> None:
+    checks = [
+        PreflightCheck(START_NS, "health", CheckResult.OK, "the autopilot would arm"),
+        PreflightCheck(START_NS, "stick_takeover", CheckResult.WARNING, "the sticks are ignored"),
+        PreflightCheck(START_NS, "return_altitude", CheckResult.FAILED, "set it to 16"),
+    ]
+    write_log(tmp_path / "a.mcap", [(START_NS, check) for check in checks])
+    report = summarise(read_flight(tmp_path / "a.mcap"))
+    assert report.preflight == PreflightSummary(
+        3, ("stick takeover: the sticks are ignored",), ("return altitude: set it to 16",)
+    )
+    lines = printed(report).splitlines()
+    assert [line for line in lines if "pre-flight" in line] == [
+        "pre-flight  return altitude: set it to 16",
+        "pre-flight  stick takeover: the sticks are ignored",
+    ]
 
 
 def test_true_poses_outside_following_do_not_count(flight: Flight) -> None:

@@ -121,7 +121,7 @@ def test_each_mistake_is_named(tmp_path: Path, edit: tuple[str, str], expected: 
         (b"[" * 2_000 + b"]" * 2_000, "nested too deeply"),
         (b"x" * 10_000_000, f"larger than {MAX_BYTES // 1024} KB"),
         (b"{}", "version: missing"),
-        (b"name: !!python/object:os.system x", "not valid YAML"),
+        (b"name: !!python/object:os.system x", "YAML tags (!name) are not allowed"),
     ],
 )
 def test_what_is_no_mission_is_refused(tmp_path: Path, content: bytes, expected: str) -> None:

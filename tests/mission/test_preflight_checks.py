@@ -9,13 +9,17 @@ import pytest
 from mission.autopilot import AutopilotError, AutopilotKind, FlightMode, Identity, LandedState, VehicleState
 from mission.camera_plan import pinhole_intrinsics
 from mission.checks import Check
+from mission.executive import Crew, Executive
+from mission.hazards import ComputerView
+from mission.journal import NoJournal
+from mission.logbook import Logbook
 from mission.offline_checks import check_offline
 from mission.plan import VehiclePlan
 from mission.preflight import wait_until_ready
 from mission.preflight_checks import Facts, check_all
-from mission.records import CheckResult
+from mission.records import CheckResult, MissionEnded, PreflightCheck, Result
 from tests.mission.test_parameter_checks import GOOD
-from tests.support.flights import LINE_HEADING_RAD, LINE_POINT_NED_M, shipped
+from tests.support.flights import LINE_HEADING_RAD, LINE_POINT_NED_M, PAPERS, KeptLog, shipped
 from tests.support.geometric_eyes import GeometricEyes
 from tests.support.in_process import InProcessAutopilot
 from tests.support.virtual_time import VirtualClock, run_virtually
@@ -130,10 +134,10 @@ def wait(
         eyes = GeometricEyes(autopilot, clock, pinhole_intrinsics(PLAN.camera), LINE_POINT_NED_M, LINE_HEADING_RAD)
         spoil(autopilot, eyes)
         plan = PLAN.model_copy(update={"vehicle": VehiclePlan(ready_time_limit_s=time_limit_s)})
-        checks = await wait_until_ready(
+        readiness = await wait_until_ready(
             autopilot, eyes, clock, plan, lambda: 10**12, lambda: False, lambda missing: None
         )
-        return {check.name: check for check in checks}, asyncio.get_running_loop().time()
+        return {check.name: check for check in readiness.checks}, asyncio.get_running_loop().time()
 
     return run_virtually(waiting())
 
@@ -185,3 +189,28 @@ def test_a_failure_that_lasts_a_moment_only_ends_nothing() -> None:
 
     checks, _ = wait(spoil)
     assert checks["battery"].result is OK
+
+
+def test_a_refused_vehicle_is_never_armed_and_the_log_says_why() -> None:
+    told: list[Check] = []
+
+    async def flight() -> tuple[MissionEnded, KeptLog, InProcessAutopilot]:
+        clock, log = VirtualClock(), KeptLog(lambda item: None)
+        autopilot = InProcessAutopilot(clock)
+        autopilot.sim.set_parameter("RTL_RETURN_ALT", 12.0)
+        camera = pinhole_intrinsics(PLAN.camera)
+        eyes = GeometricEyes(autopilot, clock, camera, LINE_POINT_NED_M, LINE_HEADING_RAD)
+        crew = Crew(autopilot, eyes, camera, log, Logbook(NoJournal(), PAPERS), ComputerView)
+        executive = Executive(PLAN, crew, clock, on_checks=told.extend)
+        ended = await executive.run()
+        assert not executive.may_have_armed
+        return ended, log, autopilot
+
+    ended, log, autopilot = run_virtually(flight())
+    assert ended.result is Result.FAILED
+    assert "return altitude: RTL_RETURN_ALT is 12 m" in ended.reason
+    assert autopilot.commands == []
+    records = {item.name: item for item in log.items if isinstance(item, PreflightCheck)}
+    assert records["return_altitude"].result is FAILED
+    assert records["offboard_loss_action"].result is OK
+    assert list(records) == [check.name for check in told]
