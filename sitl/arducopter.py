@@ -127,7 +127,8 @@ class ArduCopterFace(MavlinkFace):
                 self._send_stream(self._streams[_GLOBAL_ORIGIN])
                 self._send_stream(self._streams[_HOME_POSITION])
         beat = self._heartbeat(autopilot)
-        if self._told_beat is not None and beat != self._told_beat:
+        has_changed = self._told_beat is not None and beat != self._told_beat
+        if has_changed and _HEARTBEAT in self._due_s:  # somebody may have switched it off
             self._due_s[_HEARTBEAT] = now_s
         self._told_beat = beat
 
