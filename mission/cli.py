@@ -203,6 +203,7 @@ def sitl(
     port: Annotated[int, typer.Option(min=1, max=65535 - 40, help="UDP port that the vehicle sends to.")] = 14540,
     seed: SeedOption = 1,
     wind: WindOption = 0.0,
+    autopilot: Annotated[Literal["px4", "arducopter"], typer.Option(help="Whose MAVLink the vehicle speaks.")] = "px4",
 ) -> None:
     """Run only the simulated vehicle, until Ctrl-C; any MAVLink program can fly it."""
     from mission.simulation import SETUP, WorldError, serve_until_stopped, world_path_or_name
@@ -211,7 +212,7 @@ def sitl(
     typer.echo(f"Its parameters are PX4's defaults, but {setup}.", err=True)
     typer.echo(f"The simulated vehicle sends to udp 127.0.0.1:{port}; Ctrl-C ends it.", err=True)
     try:
-        summary = serve_until_stopped(world_path_or_name(world), speed, port, seed, wind)
+        summary = serve_until_stopped(world_path_or_name(world), speed, port, seed, wind, autopilot)
     except (WorldError, OSError) as error:
         _fail(str(error), EXIT_BAD_INPUT)
     typer.echo(

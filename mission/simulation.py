@@ -8,6 +8,7 @@ import signal
 import socket
 import threading
 from collections.abc import Callable
+from dataclasses import replace
 from multiprocessing.connection import Connection
 from multiprocessing.synchronize import Event as ProcessEvent
 from pathlib import Path
@@ -25,7 +26,7 @@ from sitl.camera import SimCamera
 from sitl.control import quaternion_of
 from sitl.map import render_map
 from sitl.pose import Pose, PoseBlock
-from sitl.server import SitlSettings, SitlSummary, run
+from sitl.server import AutopilotName, SitlSettings, SitlSummary, run
 from sitl.setup import SETUP
 from sitl.world import World, WorldError, load_world
 
@@ -176,13 +177,16 @@ def free_udp_port() -> int:
                 return port
 
 
-def serve_until_stopped(world: str | None, speed: float, port: int, seed: int, wind_m_s: float) -> SitlSummary:
+def serve_until_stopped(
+    world: str | None, speed: float, port: int, seed: int, wind_m_s: float, autopilot: AutopilotName = "px4"
+) -> SitlSummary:
     """Run the simulated vehicle in this process until SIGINT or SIGTERM. Raises WorldError."""
     stop = threading.Event()
     for signal_number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(signal_number, lambda _number, _frame: stop.set())
     clock = ScaledClock(speed, ScaledClock().now_ns())
-    return run(sitl_settings(load_world(world), clock, port, seed, wind_m_s, None), stop.is_set)
+    settings = sitl_settings(load_world(world), clock, port, seed, wind_m_s, None)
+    return run(replace(settings, autopilot=autopilot), stop.is_set)
 
 
 def _serve(settings: SitlSettings, stop: ProcessEvent, summaries: Connection) -> None:

@@ -12,9 +12,9 @@ from sitl.commander import Commander
 from sitl.control import AttitudeControl, Estimate, PositionControl, Setpoint, attitude_of
 from sitl.estimator import Estimator
 from sitl.failsafes import Failsafe, Observation
-from sitl.flight_tasks import Descend, FlightTask, Hold, Land, Offboard, Return, Takeoff
-from sitl.manual_tasks import AltitudeTask, StickTask
+from sitl.flight_tasks import Return, Takeoff
 from sitl.modes import Answer, Landed, Mode, Severity
+from sitl.navigator import Navigator, Situation
 from sitl.parameters import Parameters
 from sitl.pilot import Pilot, Sticks
 from sitl.place import Home, Origin
@@ -74,16 +74,11 @@ class SimAutopilot:
         self._was_landing = False
         self._was_armed = False
         self._ramp = TakeoffRamp(self.parameters)
-        self._task: FlightTask | None = None
-        self._task_key: object = None
-        self._offboard_target: tuple[Vector, float] | None = None
         self._setpoint_s: float | None = None
         self._station_s: float | None = None
         self._has_taken_off = False
-        self._took_off_here = False
-        self._takeoff_requests = 0
-        self._takeoff_altitude_m: float | None = None
         self._pilot = Pilot(self.parameters)
+        self._navigator = Navigator(self.parameters, self.origin, self._pilot, self._say_later)
         self._stick_mode = self.mode
         self._preflight = Preflight(self.parameters, self.say)
         self._positioning = Positioning()
@@ -111,9 +106,9 @@ class SimAutopilot:
         """The landed state, as EXTENDED_SYS_STATE tells it."""
         if self._land_detector.is_landed:
             return Landed.ON_GROUND
-        if self.mode is Mode.TAKEOFF and self._took_off_here:
+        if self.mode is Mode.TAKEOFF and self._navigator.has_left_by_takeoff:
             return Landed.TAKEOFF
-        if self._task is not None and self._task.is_landing:
+        if self._navigator.task is not None and self._navigator.task.is_landing:
             return Landed.LANDING
         return Landed.IN_AIR
 
@@ -150,7 +145,7 @@ class SimAutopilot:
             self._set_home()
             self._has_taken_off = False
             if self.mode is Mode.TAKEOFF:
-                self._takeoff_requests += 1
+                self._navigator.begin_takeoff()
         return answer
 
     def disarm(self, *, is_forced: bool = False) -> Answer:
@@ -159,8 +154,7 @@ class SimAutopilot:
 
     def takeoff(self, altitude_m: float | None = None) -> Answer:
         """Take off to `altitude_m` AMSL, or to MIS_TAKEOFF_ALT over home; disarmed it waits for arming."""
-        self._takeoff_requests += 1
-        self._takeoff_altitude_m = altitude_m
+        self._navigator.ask_takeoff(altitude_m)
         return self.commander.request(Mode.TAKEOFF)
 
     def land(self) -> Answer:
@@ -180,20 +174,10 @@ class SimAutopilot:
 
         What is not finite keeps what is: the position where the vehicle is, the yaw that was last asked for offboard.
         """
-        n, e, d = self.estimate.position_m
-        target = tuple(
-            wanted if math.isfinite(wanted) else actual
-            for wanted, actual in zip((north_m, east_m, down_m), (n, e, d), strict=True)
-        )
-        if not math.isfinite(yaw_rad):
-            asked = self._offboard_target if isinstance(self._task, Offboard) else None
-            yaw_rad = asked[1] if asked is not None else euler_of(self.estimate.quaternion)[2]
-        self._offboard_target = ((target[0], target[1], target[2]), yaw_rad)
+        self._navigator.aim((north_m, east_m, down_m, yaw_rad), self.estimate)
         self._setpoint_s = self.boot_s
         # PX4's commander sees a fresh stream at once: MAVSDK sends a setpoint and the mode change in one go.
         self.commander.see_setpoint()
-        if isinstance(self._task, Offboard):
-            self._task.aim(*self._offboard_target)
 
     def hear_station(self) -> None:
         """A ground station's heartbeat came (HEARTBEAT of MAV_TYPE_GCS)."""
@@ -240,7 +224,7 @@ class SimAutopilot:
         self._ramp.step(
             dt_s,
             is_armed=commander.is_armed,
-            wants_takeoff=self._wants_takeoff(),
+            wants_takeoff=self._navigator.wants_takeoff(self.estimate),
             is_landed=self._land_detector.is_landed,
         )
         thrust, torque = self._control(dt_s)
@@ -268,15 +252,15 @@ class SimAutopilot:
 
     def _control(self, dt_s: float) -> tuple[float, Vector]:
         """Thrust 0 to 1 and torques -1 to 1 of this step."""
-        state = self._ramp.state
-        if state in (Ramp.DISARMED, Ramp.SPOOLUP, Ramp.READY) or self._task is None:
+        state, task = self._ramp.state, self._navigator.task
+        if state in (Ramp.DISARMED, Ramp.SPOOLUP, Ramp.READY) or task is None:
             self._position_control.reset()
             self._attitude_control.reset()
             self.setpoint = None
             return (0.0 if state is Ramp.DISARMED else 0.001), (0.0, 0.0, 0.0)
-        if state is Ramp.RAMPUP and isinstance(self._task, Takeoff) and self._ramp.max_up_m_s(1.0) < 0.0:
-            self._task.wait()
-        setpoint = self._task.step(dt_s, self.estimate, self.vehicle.height_m)
+        if state is Ramp.RAMPUP and isinstance(task, Takeoff) and self._ramp.max_up_m_s(1.0) < 0.0:
+            task.wait()
+        setpoint = task.step(dt_s, self.estimate, self.vehicle.height_m)
         if state is Ramp.RAMPUP:
             setpoint = replace(setpoint, max_up_m_s=self._ramp.max_up_m_s(setpoint.max_up_m_s))
         self.setpoint = setpoint
@@ -289,64 +273,20 @@ class SimAutopilot:
         return math.sqrt(thrust[0] ** 2 + thrust[1] ** 2 + thrust[2] ** 2), torque
 
     def _follow_mode(self) -> None:
-        """Start the flight task of the mode, and go on after a take-off."""
-        if isinstance(self._task, Takeoff) and self._task.is_done and self.mode is Mode.TAKEOFF:
+        """Fly the mode's task, and go on after a take-off."""
+        task = self._navigator.task
+        if isinstance(task, Takeoff) and task.is_done and self.mode is Mode.TAKEOFF:
             self.commander.finish_takeoff()
-        if not self.is_armed:
-            self._task = self._task_key = None
-            return
-        takeoff = self._takeoff_requests if self.mode is Mode.TAKEOFF else 0
-        # What else decides between the tasks of a mode.
-        is_steered = self.mode.needs_sticks and self.sticks is not None
-        is_blind = not self.is_position_valid and (self.mode.needs_sticks or self.mode is Mode.LAND)
-        if self.mode is not Mode.TAKEOFF:
-            self._took_off_here = False
-        key = (self.mode, takeoff, is_steered, is_blind)
-        if key != self._task_key:
-            self._task_key = key
-            self._task = self._task_of(self.mode)
-
-    def _task_of(self, mode: Mode) -> FlightTask:
-        if mode is Mode.OFFBOARD and self._offboard_target is not None:
-            return Offboard(self.parameters, *self._offboard_target)
-        if mode is Mode.TAKEOFF:
-            self._took_off_here = self._land_detector.is_landed or self._took_off_here
-            return Takeoff(self.parameters, self.estimate, min(self._takeoff_down_m(), self.estimate.position_m[2]))
-        if mode is Mode.RTL and self.home is not None:
-            task = Return(self.parameters, self.estimate, self.home.position_m, self.home.yaw_rad)
-            home_altitude_m = self.origin.global_of(self.home.position_m)[2]
-            self.say(
-                Severity.INFO,
-                f"RTL: start return at {math.ceil(home_altitude_m + task.return_height_m)} m "
-                f"({math.ceil(task.return_height_m)} m above destination)",
-                delay_s=_NAVIGATOR_S,
+        self._navigator.follow(
+            Situation(
+                self.mode,
+                self.estimate,
+                self.home,
+                is_armed=self.is_armed,
+                is_landed=self._land_detector.is_landed,
+                is_position_valid=self.is_position_valid,
             )
-            return task
-        if mode is Mode.LAND and self.is_position_valid:
-            return Land(self.parameters, self.estimate)
-        if mode is Mode.LAND or (mode.needs_sticks and self.sticks is None):
-            return Descend(self.parameters, self.estimate, is_blind=not self.is_position_valid)
-        if mode is Mode.POSCTL:
-            return StickTask(self.parameters, self.estimate, self._pilot)
-        if mode.needs_sticks:  # the model has no attitude or rate mode: it holds the altitude in all of them
-            return AltitudeTask(self.parameters, self.estimate, self._pilot)
-        return Hold(self.parameters, self.estimate)
-
-    def _takeoff_down_m(self) -> float:
-        """Where a take-off ends, down [m] NED: at the altitude asked for if that is above, else at the default one."""
-        if self._takeoff_altitude_m is not None:
-            down_m = self.origin.altitude_m - self._takeoff_altitude_m
-            if down_m < self.estimate.position_m[2] - self.parameters.get("NAV_MC_ALT_RAD"):
-                return down_m
-        height_m = self.parameters.get("MIS_TAKEOFF_ALT")
-        self.say(Severity.INFO, f"Using default takeoff altitude: {height_m:.1f} m", delay_s=_NAVIGATOR_S)
-        return self.estimate.position_m[2] - height_m  # from where it is, also in the air
-
-    def _wants_takeoff(self) -> bool:
-        """Whether the task would leave the ground: a take-off, or an offboard setpoint above."""
-        if isinstance(self._task, Offboard) and self._offboard_target is not None:
-            return self._offboard_target[0][2] < self.estimate.position_m[2] - 0.3
-        return isinstance(self._task, Takeoff)
+        )
 
     def _detect_landing(self, dt_s: float) -> None:
         detector, ramp = self._land_detector, self._ramp.state
@@ -361,7 +301,8 @@ class SimAutopilot:
             is_flying=ramp is Ramp.FLIGHT,
             thrust=self.thrust,
         )
-        self._was_landing = isinstance(self._task, Return) and self._task.is_landing
+        task = self._navigator.task
+        self._was_landing = isinstance(task, Return) and task.is_landing
         if self._was_landing and not was_landing:
             self.say(Severity.INFO, "RTL: land at destination")
         if was_landed and not detector.is_landed:
@@ -400,3 +341,6 @@ class SimAutopilot:
     def say(self, severity: Severity, text: str, *, delay_s: float = 0.0) -> None:
         """Send a status text, `delay_s` [s] from now."""
         self._texts.append((self.boot_s + delay_s, severity, text))
+
+    def _say_later(self, text: str) -> None:
+        self.say(Severity.INFO, text, delay_s=_NAVIGATOR_S)

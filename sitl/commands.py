@@ -15,7 +15,7 @@ MISSION_START = 300
 ARM_DISARM = 400
 RUN_PREARM_CHECKS = 401
 INJECT_FAILURE = 420
-_FORCE = 21196
+FORCE = 21196
 _UNIT_BATTERY, _TYPE_OFF = 100, 1  # FAILURE_UNIT, FAILURE_TYPE
 
 
@@ -24,7 +24,7 @@ def execute(autopilot: SimAutopilot, command: int, params: tuple[float, ...]) ->
     if command == ARM_DISARM:
         if _is(params[0], 1):
             return autopilot.arm()
-        return autopilot.disarm(is_forced=_is(params[1], _FORCE))
+        return autopilot.disarm(is_forced=_is(params[1], FORCE))
     if command == TAKEOFF:
         return autopilot.takeoff(params[6] if math.isfinite(params[6]) else None)
     if command == LAND:

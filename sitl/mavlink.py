@@ -51,15 +51,19 @@ class _NoComponentMetadata(dialect.MAVLink_message):  # type: ignore[misc]
 class MavlinkFace:
     """One autopilot's end of a MAVLink link: bytes in by `receive`, bytes out by `service`."""
 
+    _pings = True
+    _marks_texts = True
+
     def __init__(self, autopilot: SimAutopilot, *, first_beat_s: float = _FIRST_BEAT_S) -> None:
         """Speak for `autopilot`, whose streams begin `first_beat_s` [s] after now."""
         self._autopilot = autopilot
+        streams = self._all_streams()
         self._outbox: list[bytes] = []
         self._mavlink: Any = dialect.MAVLink(None, srcSystem=_SYSTEM, srcComponent=_COMPONENT)
-        self._streams = {stream.message_id: stream for stream in STREAMS}
+        self._streams = {stream.message_id: stream for stream in streams}
         first_s = autopilot.boot_s + first_beat_s
-        self._due_s = {stream.message_id: first_s for stream in STREAMS if stream.rate_hz > 0}
-        self._intervals_s = {stream.message_id: 1 / stream.rate_hz for stream in STREAMS if stream.rate_hz > 0}
+        self._due_s = {stream.message_id: first_s for stream in streams if stream.rate_hz > 0}
+        self._intervals_s = {stream.message_id: 1 / stream.rate_hz for stream in streams if stream.rate_hz > 0}
         self._commands: deque[tuple[float, Any, int, tuple[float, ...]]] = deque()
         self._parameters: deque[Parameter] = deque()
         self._has_refused_frame = False
@@ -69,6 +73,13 @@ class MavlinkFace:
         self._heard_s = -math.inf
         self._n_pings = 0
         self._ping_s = autopilot.boot_s
+
+    def _all_streams(self) -> tuple[Stream, ...]:
+        """What can be sent, with its default rates."""
+        return STREAMS
+
+    def _look(self, now_s: float) -> None:
+        """Anything else to do before sending, at `now_s` [s, boot]."""
 
     def receive(self, data: bytes) -> None:
         """Take a datagram: whole messages, so that a broken one does not spoil the next."""
@@ -80,6 +91,7 @@ class MavlinkFace:
     def service(self) -> list[bytes]:
         """Carry out what is due now, in the autopilot's time; returns the messages to send, in order."""
         now_s = self._autopilot.boot_s
+        self._look(now_s)
         while self._commands and self._commands[0][0] <= now_s:
             _, message, command, params = self._commands.popleft()
             self._acknowledge(message, command, self._execute(command, params))
@@ -95,7 +107,7 @@ class MavlinkFace:
                 # Keep the rate over jitter, but never make up for missed messages.
                 self._due_s[message_id] = max(due_s + interval_s, now_s)
                 self._send_stream(self._streams[message_id])
-        if self._ping_s <= now_s:
+        if self._pings and self._ping_s <= now_s:
             self._ping_s = now_s + 1.0
             self._send(self._mavlink.ping_encode(round(now_s * 1e6), self._n_pings, 0, 0))
             self._n_pings += 1
@@ -247,7 +259,7 @@ class MavlinkFace:
 
     def _send_text(self, severity: int, text: str) -> None:
         """Send a text as PX4 does: a tab says that it also exists as an event, and 50 characters make a chunk."""
-        end = "" if text.startswith("Preflight") else "\t"
+        end = "\t" if self._marks_texts and not text.startswith("Preflight") else ""
         data = f"{text}{end}".encode("ascii", "replace")
         for chunk, start in enumerate(range(0, len(data), _TEXT_CHUNK)):
             piece = data[start : start + _TEXT_CHUNK]

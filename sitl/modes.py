@@ -70,6 +70,7 @@ class Answer(enum.IntEnum):
     TEMPORARILY_REJECTED = 1
     DENIED = 2
     UNSUPPORTED = 3
+    FAILED = 4
 
 
 class Severity(enum.IntEnum):

@@ -3,8 +3,10 @@
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Literal
 
 from drivers.clock import NS_PER_S, ScaledClock
+from sitl.arducopter import ArduCopterFace
 from sitl.autopilot import SimAutopilot
 from sitl.mavlink import MavlinkFace
 from sitl.parameters import Parameters
@@ -14,6 +16,8 @@ from sitl.udp import UdpLink
 from sitl.vehicle import Vehicle
 from sitl.wind import Wind
 
+AutopilotName = Literal["px4", "arducopter"]
+_FACES: dict[AutopilotName, type[MavlinkFace]] = {"px4": MavlinkFace, "arducopter": ArduCopterFace}
 _STEP_NS = 4_000_000  # 250 Hz of flight time
 _STEP_S = _STEP_NS / NS_PER_S
 _MAX_BURST = 50  # steps without a look at the clock; the sockets are served after each
@@ -27,7 +31,7 @@ class SitlSettings:
     `port` is the application's UDP port; `wind_m_s` the mean wind at 20 ft, whose direction `seed` draws;
     `start_yaw_rad` the heading at start; `origin` places the world's NED frame, where the vehicle stands at start;
     `pose_block` names the shared memory that gets the true pose (None: nobody looks); `parameters` are set over PX4's
-    defaults.
+    defaults; `autopilot` whose face it shows.
     """
 
     port: int
@@ -38,6 +42,7 @@ class SitlSettings:
     origin: Origin
     pose_block: str | None
     parameters: tuple[tuple[str, float | int], ...] = ()
+    autopilot: AutopilotName = "px4"
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,7 +77,7 @@ def run(settings: SitlSettings, should_stop: Callable[[], bool]) -> SitlSummary:
     forgive_ns = round(_FORGIVE_WALL_NS * clock.speed)
     n_steps = 0
     try:
-        with UdpLink(MavlinkFace(autopilot), settings.port) as link:
+        with UdpLink(_FACES[settings.autopilot](autopilot), settings.port) as link:
             began_s = time.monotonic()
             flight_ns = clock.now_ns()
             while not should_stop():

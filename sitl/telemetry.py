@@ -206,7 +206,7 @@ def _extended_sys_state(autopilot: SimAutopilot) -> Fields:
     return 0, int(autopilot.landed)
 
 
-def _uid2(autopilot: SimAutopilot) -> list[int]:
+def uid2(autopilot: SimAutopilot) -> list[int]:
     """The 18 bytes of the hardware's longer number: the short one, and zeros."""
     return [*autopilot.uid.to_bytes(8, "big"), *[0] * 10]
 
@@ -225,7 +225,7 @@ def _autopilot_version(autopilot: SimAutopilot) -> Fields:
         0,
         0,
         autopilot.uid,
-        _uid2(autopilot),
+        uid2(autopilot),
     )
 
 

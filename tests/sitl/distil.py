@@ -44,19 +44,19 @@ DEEDS: dict[str, list[Any]] = {
 }
 CUTS = ("dropping everything", "app destroys")  # from here nothing of the application's arrives
 DROPS, PASSES = ("dropping SET_POSITION", "setpoints dropped", "drop setpoints"), "setpoints pass"
-WAITS = ("health", "takeoff done", "ON_GROUND", "disarmed", "auto-disarm", "armed", "ready")
+WAITS = ("health", "takeoff done", "ON_GROUND", "disarmed", "auto-disarm", "armed")
 
 
 def messages(path: Path) -> Iterator[tuple[float, Any]]:
     """Every message of a recording with the autopilot's boot time [s] then."""
     data = lzma.decompress(path.read_bytes())
-    parser: Any = dialect.MAVLink(None)
-    parser.robust_parsing = True
     place, boot_s = 0, 0.0
     while place < len(data):
         place += 8  # the wall time
         is_v2 = data[place] == 0xFD
         length = data[place + 1] + (12 + 13 * (data[place + 2] & 1) if is_v2 else 8)
+        parser: Any = dialect.MAVLink(None)  # a new one, which no unknown message before can have led astray
+        parser.robust_parsing = True
         for message in parser.parse_buffer(data[place : place + length]) or []:
             if message.get_srcSystem() == 1 and hasattr(message, "time_boot_ms"):
                 boot_s = message.time_boot_ms / 1e3

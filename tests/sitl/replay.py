@@ -13,6 +13,7 @@ from typing import Any
 
 from pymavlink.dialects.v20 import all as dialect
 
+from sitl.arducopter import ArduCopterFace
 from sitl.autopilot import SimAutopilot
 from sitl.mavlink import MavlinkFace
 from sitl.parameters import Parameters
@@ -203,6 +204,12 @@ class Player:
 def int_as_float(value: int) -> float:
     """An INT32 parameter's bytes read as the float that PARAM_SET carries."""
     return float(dialect.struct.unpack("<f", dialect.struct.pack("<i", value))[0])
+
+
+def play_arducopter(record: dict[str, Any]) -> Replay:
+    """Play a record to a simulated ArduCopter that beats its heart when the recorded one did."""
+    autopilot = SimAutopilot(seed=4, speed=record["speed"])
+    return Player(record, autopilot, ArduCopterFace(autopilot, first_beat_s=0.94)).play()
 
 
 def play_px4(record: dict[str, Any]) -> Replay:

@@ -64,5 +64,5 @@ def test_an_exception_hides_what_it_names(replay: Replay) -> None:
 
 def test_a_wait_in_vain_is_told() -> None:
     record = copy.deepcopy(RECORD)
-    record["inputs"] = [[1.0, "wait", "landed", [3]]]
+    record["inputs"], record["end_s"] = [[1.0, "wait", "landed", [3]]], 20.0
     assert differences(record, play_px4(record), {})[0] == "waited in vain for landed [3], recorded at 1.0 s"

@@ -4,13 +4,15 @@ import itertools
 import math
 import socket
 import time
+from dataclasses import replace
 
 import pytest
+from pymavlink.dialects.v20 import all as dialect
 
 from drivers.clock import NS_PER_S, ScaledClock
 from sitl.place import Origin
 from sitl.pose import PoseBlock
-from sitl.server import SitlSettings, SitlSummary, run
+from sitl.server import AutopilotName, SitlSettings, SitlSummary, run
 
 
 class StopAfter:
@@ -84,3 +86,24 @@ def test_a_missing_pose_block_is_an_error() -> None:
 def test_speed_is_flight_time_over_wall_time() -> None:
     assert SitlSummary(20.0, 5.0).achieved_speed == 4.0
     assert math.isfinite(SitlSummary(0.0, 0.0).achieved_speed)
+
+
+@pytest.mark.parametrize(("autopilot", "number"), [("px4", 12), ("arducopter", 3)])
+def test_it_shows_the_face_that_was_asked_for(autopilot: AutopilotName, number: int) -> None:
+    clock = ScaledClock(10.0, time.monotonic_ns())
+    with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as application:
+        application.bind(("127.0.0.1", 0))
+        port = int(application.getsockname()[1])
+        run(replace(settings(clock, port), autopilot=autopilot), StopAfter(clock, 1.0))
+        application.setblocking(False)
+        mavlink = dialect.MAVLink(None)
+        heard = [message for _ in range(1000) for message in mavlink.parse_buffer(_datagram(application)) or []]
+    (beat, *_) = [message for message in heard if message.get_type() == "HEARTBEAT"]
+    assert beat.autopilot == number
+
+
+def _datagram(application: socket.socket) -> bytes:
+    try:
+        return application.recv(65535)
+    except BlockingIOError:
+        return b""
