@@ -21,7 +21,7 @@ def test_mavsdk_flies_it_when_it_asks_for_streams() -> None:
     port, context = free_port(), multiprocessing.get_context("spawn")
     stop, pose_block = context.Event(), PoseBlock.create()
     clock = ScaledClock(SPEED, time.monotonic_ns())
-    settings = SitlSettings(port, 1, 0.0, clock, 0.0, Origin(), pose_block.name, "arducopter")
+    settings = SitlSettings(port, 1, 0.0, clock, 0.0, Origin(), pose_block.name, autopilot="arducopter")
     vehicle = context.Process(target=run, args=(settings, stop.is_set))
     vehicle.start()
     try:
