@@ -12,7 +12,8 @@ fly: $(VENV)/.installed
 	$(BIN)/lineflight dry-run $(MISSION) $(FLY)
 
 test: $(VENV)/.installed-dev
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n auto -m "not real_time"
+	$(BIN)/python -m pytest -m real_time
 
 test-v4l2: $(VENV)/.installed-dev
 	$(BIN)/python -m tests.v4l2_guest.boot $(PYTEST)

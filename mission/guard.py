@@ -13,7 +13,9 @@ from typing import Self
 
 from mission import guard_process
 
-SILENCE_LIMIT_S = 0.5
+SILENCE_LIMIT_S = 0.4
+"""With the guard's own slices and the end of a process, the stream of setpoints has ended half a second later."""
+
 TICK_LIMIT_S = 7.0
 """A control tick may wait this long for an answer (each command has its own limit, 5 s); then it counts as hung too."""
 

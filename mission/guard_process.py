@@ -20,7 +20,7 @@ ARM, BEAT, STAND_DOWN = b"a", b".", b"s"
 READY = b"r"
 """What the guard says once it can act."""
 
-_SLICES = 10
+_SLICES = 8
 _STALLED = (
     "\nlineflight: the control loop was silent for {limit_s:g} s. Its process was ended, so that the autopilot's own "
     "failsafe takes over; nothing sends setpoints any more. When the vehicle is safe: lineflight resume --explain\n"

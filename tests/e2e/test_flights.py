@@ -13,6 +13,8 @@ from drivers.camera.camera import Intrinsics
 from mission.simulation import free_udp_port
 from tests.support.command_line import ROOT, lineflight, lineflight_stopped
 
+pytestmark = pytest.mark.real_time
+
 FOLLOW_LINE = ROOT / "missions" / "follow_line.yaml"
 ALL_TASKS = ROOT / "tests" / "data" / "all_tasks.yaml"
 

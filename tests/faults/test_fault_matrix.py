@@ -1,32 +1,19 @@
 """Every fault in every task, flown in virtual time, against the declared table."""
 
-from collections.abc import Iterator
-from concurrent.futures import Future
-
 import pytest
 
 from mission.plan import TASK_MODELS
 from tests.faults.faults import FAULTS
-from tests.faults.flight import Flight, fly_case
+from tests.faults.flight import fly_case
 from tests.faults.page import PAGE, with_matrix
 from tests.faults.table import EXPECTED, TASKS, End, expected
-from tests.support.cores import chosen_cases, on_all_cores
 
 CASES = [(fault.name, task) for fault in FAULTS for task in TASKS]
 
 
-@pytest.fixture(scope="module")
-def flights(request: pytest.FixtureRequest) -> Iterator[dict[tuple[str, str], Future[Flight]]]:
-    cases = chosen_cases(request, "fault", "task")
-    with on_all_cores(fly_case, cases) as futures:
-        yield dict(zip(cases, futures, strict=True))
-
-
 @pytest.mark.parametrize(("fault", "task"), CASES)
-def test_each_fault_in_each_task_ends_as_declared(
-    fault: str, task: str, flights: dict[tuple[str, str], Future[Flight]]
-) -> None:
-    flight = flights[fault, task].result()
+def test_each_fault_in_each_task_ends_as_declared(fault: str, task: str) -> None:
+    flight = fly_case(fault, task)
     assert flight.broken == [], flight.story
     assert flight.end is expected(fault, task), flight.story
 

@@ -131,7 +131,9 @@ def wait(
     async def waiting() -> tuple[dict[str, Check], float]:
         clock = VirtualClock()
         autopilot = InProcessAutopilot(clock)
-        eyes = GeometricEyes(autopilot, clock, pinhole_intrinsics(PLAN.camera), LINE_POINT_NED_M, LINE_HEADING_RAD)
+        eyes = GeometricEyes(
+            autopilot.true_pose, clock, pinhole_intrinsics(PLAN.camera), LINE_POINT_NED_M, LINE_HEADING_RAD
+        )
         spoil(autopilot, eyes)
         plan = PLAN.model_copy(update={"vehicle": VehiclePlan(ready_time_limit_s=time_limit_s)})
         readiness = await wait_until_ready(
@@ -199,7 +201,7 @@ def test_a_refused_vehicle_is_never_armed_and_the_log_says_why() -> None:
         autopilot = InProcessAutopilot(clock)
         autopilot.sim.set_parameter("RTL_RETURN_ALT", 12.0)
         camera = pinhole_intrinsics(PLAN.camera)
-        eyes = GeometricEyes(autopilot, clock, camera, LINE_POINT_NED_M, LINE_HEADING_RAD)
+        eyes = GeometricEyes(autopilot.true_pose, clock, camera, LINE_POINT_NED_M, LINE_HEADING_RAD)
         crew = Crew(autopilot, eyes, camera, log, Logbook(NoJournal(), PAPERS), ComputerView)
         executive = Executive(PLAN, crew, clock, on_checks=told.extend)
         ended = await executive.run()

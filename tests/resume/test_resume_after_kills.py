@@ -1,14 +1,12 @@
 """kill -9 at fifty random moments of a mission, then resume: it completes, or is refused with a reason."""
 
 import random
-from collections.abc import Iterator
-from concurrent.futures import Future
+from pathlib import Path
 
 import pytest
 
 from mission.records import Result
-from tests.resume.killed_flight import Aftermath, kill_and_resume
-from tests.support.cores import chosen_cases, on_all_cores
+from tests.resume.killed_flight import kill_and_resume
 from tests.support.flights import ALL_TASKS_PLAN
 
 TASKS = [task.task for task in ALL_TASKS_PLAN.tasks]
@@ -18,23 +16,9 @@ _DRAW = random.Random("kills")
 KILLS = [(round(_DRAW.uniform(1.0, 75.0), 2), _DRAW.choice([0.3, 3.0, 30.0, 100.0])) for _ in range(N_KILLS)]
 
 
-@pytest.fixture(scope="module")
-def aftermaths(
-    request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory
-) -> Iterator[dict[tuple[float, float], Future[Aftermath]]]:
-    cases = chosen_cases(request, "kill_s", "away_s")
-    folders = [tmp_path_factory.mktemp("killed") for _ in cases]
-    with on_all_cores(
-        kill_and_resume, [(folder, *case) for folder, case in zip(folders, cases, strict=True)]
-    ) as futures:
-        yield dict(zip(cases, futures, strict=True))
-
-
 @pytest.mark.parametrize(("kill_s", "away_s"), KILLS)
-def test_a_killed_mission_completes_or_says_why_not(
-    kill_s: float, away_s: float, aftermaths: dict[tuple[float, float], Future[Aftermath]]
-) -> None:
-    after = aftermaths[kill_s, away_s].result()
+def test_a_killed_mission_completes_or_says_why_not(kill_s: float, away_s: float, tmp_path: Path) -> None:
+    after = kill_and_resume(tmp_path, kill_s, away_s)
     # Each transition is in the journal, in order; one more may be, which was about to happen.
     assert after.journalled[: len(after.reached)] == after.reached
     assert len(after.journalled) - len(after.reached) in (0, 1)

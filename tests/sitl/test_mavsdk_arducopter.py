@@ -14,6 +14,8 @@ from sitl.pose import PoseBlock
 from sitl.server import SitlSettings, run
 from tests.sitl.test_mavsdk_flight import ROOT, free_port
 
+pytestmark = pytest.mark.real_time
+
 SPEED = 4.0
 
 

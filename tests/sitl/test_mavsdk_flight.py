@@ -19,6 +19,8 @@ from sitl.place import Origin
 from sitl.pose import PoseBlock
 from sitl.server import SitlSettings, run
 
+pytestmark = pytest.mark.real_time
+
 ROOT = Path(__file__).parents[2]
 GOLDEN = json.loads((Path(__file__).parent / "golden" / "px4_a_nominal.json").read_text())
 SPEED = 4.0

@@ -14,6 +14,8 @@ from sitl.place import Origin
 from sitl.pose import PoseBlock
 from sitl.server import AutopilotName, SitlSettings, SitlSummary, run
 
+pytestmark = pytest.mark.real_time
+
 
 class StopAfter:
     """Says stop once the flight's clock has passed `flight_s`."""

@@ -112,7 +112,7 @@ def bare_executive(
 ) -> Executive:
     """An executive over a vehicle that somebody else has made, with eyes of its own."""
     camera = pinhole_intrinsics(plan.camera)
-    eyes = GeometricEyes(autopilot, clock, camera, LINE_POINT_NED_M, LINE_HEADING_RAD)
+    eyes = GeometricEyes(autopilot.true_pose, clock, camera, LINE_POINT_NED_M, LINE_HEADING_RAD)
     logbook = Logbook(journal or NoJournal(), PAPERS)
     crew = Crew(autopilot, eyes, camera, log or KeptLog(lambda _: None), logbook, ComputerView)
     return Executive(plan, crew, clock, resumption)
@@ -133,7 +133,7 @@ def fly(
         clock = VirtualClock()
         autopilot = InProcessAutopilot(clock, start_yaw_rad=START_YAW_RAD, wind_m_s=wind_m_s, seed=seed)
         camera = pinhole_intrinsics(plan.camera)
-        eyes = GeometricEyes(autopilot, clock, camera, LINE_POINT_NED_M, LINE_HEADING_RAD)
+        eyes = GeometricEyes(autopilot.true_pose, clock, camera, LINE_POINT_NED_M, LINE_HEADING_RAD)
         computer = Computer()
         loop = asyncio.get_running_loop()
         has_done = False

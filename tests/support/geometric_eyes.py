@@ -5,14 +5,17 @@ other way by Euler angles, rather than repeating it.
 """
 
 import math
+from collections.abc import Callable
 
 import numpy as np
 
 from drivers.camera.camera import Intrinsics
 from drivers.clock import Clock
 from mission.eyes import Notice
-from tests.support.in_process import InProcessAutopilot
 from vision.records import NO_LINES, LineEstimate, Track, VisionReport, wrap_line_angle_rad
+
+Pose = tuple[tuple[float, float, float], tuple[float, float, float, float]]
+"""Position NED [m] and attitude (w, x, y, z)."""
 
 FRAME_PERIOD_NS = 40_000_000
 LATENCY_NS = 60_000_000
@@ -72,13 +75,13 @@ class GeometricEyes:
 
     def __init__(
         self,
-        autopilot: InProcessAutopilot,
+        pose: Callable[[], Pose | None],
         clock: Clock,
         camera: Intrinsics,
         line_point_ned_m: tuple[float, float, float],
         line_heading_rad: float,
     ) -> None:
-        self._autopilot = autopilot
+        self._pose = pose
         self._clock = clock
         self._camera = camera
         self._point = line_point_ned_m
@@ -95,15 +98,15 @@ class GeometricEyes:
     def take(self) -> list[VisionReport]:
         """Look whenever a frame is due; hand it over when its latency has passed."""
         now_ns = self._clock.now_ns()
-        self._autopilot.catch_up()
+        pose = self._pose()
+        if pose is None:
+            return []
         if now_ns >= self._next_ns and self.failure is None and not self.is_silent:
             self._next_ns = now_ns + FRAME_PERIOD_NS
-            vehicle = self._autopilot.sim.vehicle
+            position_m, quaternion = pose
             estimate = None
             if not self.is_blind:
-                estimate = see_line(
-                    vehicle.position_m, vehicle.quaternion, self._camera, self._point, self._heading_rad, now_ns
-                )
+                estimate = see_line(position_m, quaternion, self._camera, self._point, self._heading_rad, now_ns)
             self._pending.append(bare_report(self._seq, now_ns, estimate, LATENCY_NS))
             self._seq += 1
         due = [report for report in self._pending if now_ns - report.t_capture_ns >= LATENCY_NS]

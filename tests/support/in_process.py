@@ -226,6 +226,11 @@ class InProcessAutopilot:
         if answer is not Answer.ACCEPTED:
             raise AutopilotError(f"the autopilot refused to {name}: {answer.name.lower()}")
 
+    def true_pose(self) -> tuple[tuple[float, float, float], tuple[float, float, float, float]]:
+        """Where the vehicle truly is: position NED [m], attitude (w, x, y, z)."""
+        self.catch_up()
+        return self.sim.vehicle.position_m, self.sim.vehicle.quaternion
+
     @property
     def true_yaw_rad(self) -> float:
         """The vehicle's true heading."""

@@ -23,6 +23,8 @@ from vision.records import Track, VisionReport
 from vision.worker import VisionWorker, WorkerEvent, WorkerFailed, WorkerReady
 from vision.worker_process import Reporter
 
+pytestmark = pytest.mark.real_time
+
 TIMEOUT_S = 120.0  # kernels may have to be compiled
 News = VisionReport | WorkerEvent
 
