@@ -72,7 +72,9 @@ class SimAutopilot:
         self._was_armed = False
         self._setpoint_s: float | None = None
         self._has_taken_off = False
-        self._pilot = Pilot(self.parameters)
+        self._pilot = Pilot(self.parameters, speed)
+        self._speed = speed
+        self._ground_station_s = -math.inf
         self._navigator = Navigator(self.parameters, self.origin, self._pilot, self._say_later)
         self._stick_mode = self.mode
         self._preflight = Preflight(self.parameters, self.say)
@@ -191,6 +193,10 @@ class SimAutopilot:
         """
         self._pilot.take(Sticks(pitch, roll, throttle, yaw), self.boot_s)
 
+    def see_ground_station(self) -> None:
+        """A ground station's heartbeat has just come; without one for COM_DL_LOSS_T it counts as gone."""
+        self._ground_station_s = self.boot_s
+
     def set_parameter(self, name: str, value: float | int) -> None:
         """Write a parameter; raises KeyError, TypeError and ValueError as Parameters.set does."""
         self.parameters.set(name, value)
@@ -304,6 +310,8 @@ class SimAutopilot:
             battery=self.battery.remaining,
             is_position_valid=self.is_position_valid,
             has_sticks=self.sticks is not None,
+            has_ground_station=self.boot_s - self._ground_station_s
+            < self.parameters.get("COM_DL_LOSS_T") * self._speed,
             is_stick_moving=self._pilot.is_moving,
             distance_m=distance_m,
             height_m=height_m,

@@ -15,7 +15,7 @@ Say = Callable[[Severity, str], None]
 
 _TEXT_GAP_S = 2.1  # PX4's health report, and with it the arming checks, follow at most this often
 _FENCE_ACTIONS = {2: Mode.LOITER, 3: Mode.RTL, 5: Mode.LAND}  # GF_ACTION; 4, terminate, is not modelled
-_STICKS_ACTIONS = {1: Mode.LOITER, 2: Mode.RTL}  # NAV_RCL_ACT; all else lands
+_LOSS_ACTIONS = {1: Mode.LOITER, 2: Mode.RTL}  # NAV_RCL_ACT, NAV_DLL_ACT; all else lands
 _OFFBOARD_ACTIONS = {3: Mode.RTL, 4: Mode.LAND, 5: Mode.LOITER}  # COM_OBL_RC_ACT; the others need sticks
 
 
@@ -25,6 +25,7 @@ class Failsafe(enum.Enum):
     OFFBOARD_LOSS = "offboard loss"
     POSITION_LOSS = "position loss"
     STICKS_LOSS = "sticks loss"
+    LINK_LOSS = "ground station loss"
     FENCE = "fence"
     BATTERY = "battery"
 
@@ -54,6 +55,7 @@ class Observation:
     battery: float = 1.0
     is_position_valid: bool = False
     has_sticks: bool = False
+    has_ground_station: bool = False
     is_stick_moving: bool = False
     distance_m: float = 0.0
     height_m: float = 0.0
@@ -82,12 +84,14 @@ class Failsafes:
         self._has_left_fence = False
         self._sticks_mode: Mode | None = None
         self._are_sticks_needed = False
+        self._link_mode: Mode | None = None
+        self._had_ground_station = False
         self._hold_until_s: float | None = None
         self._active: Reaction | None = None
 
     def release(self) -> None:
         """A person changed the mode, or the motors were disarmed: that ends every latched reaction."""
-        self._battery_mode = self._fence_mode = self._sticks_mode = None
+        self._battery_mode = self._fence_mode = self._sticks_mode = self._link_mode = None
         self._hold_until_s = None
         self._active = None
         self._are_sticks_needed = False
@@ -101,6 +105,7 @@ class Failsafes:
             return None
         self._watch_fence(seen)
         self._watch_sticks(seen, intended)
+        self._watch_link(seen)
         self._end_hold(seen)
         reaction = self._gravest(intended, seen, is_offboard_available=is_offboard_available)
         if reaction is not None and self._active is None and self._hold_until_s is None:
@@ -116,6 +121,7 @@ class Failsafes:
         for cause, mode in (
             (Failsafe.BATTERY, self._battery_mode),
             (Failsafe.STICKS_LOSS, self._sticks_mode),
+            (Failsafe.LINK_LOSS, self._link_mode),
             (Failsafe.FENCE, self._fence_mode),
         ):
             if mode is not None:
@@ -148,7 +154,9 @@ class Failsafes:
         if self._battery_mode is not None:
             self._battery_mode = Mode.LAND if self.warning is BatteryWarning.EMERGENCY else Mode.RTL
         if self._sticks_mode is not None:
-            self._sticks_mode = _STICKS_ACTIONS.get(int(self._parameters.get("NAV_RCL_ACT")), Mode.LAND)
+            self._sticks_mode = _LOSS_ACTIONS.get(int(self._parameters.get("NAV_RCL_ACT")), Mode.LAND)
+        if self._link_mode is not None:
+            self._link_mode = _LOSS_ACTIONS.get(int(self._parameters.get("NAV_DLL_ACT")), Mode.LAND)
 
     def _watch_fence(self, seen: Observation) -> None:
         """The cylinder around home (GF_MAX_HOR_DIST, GF_MAX_VER_DIST), by GF_ACTION."""
@@ -183,6 +191,16 @@ class Failsafes:
             if not int(self._parameters.get("COM_RCL_EXCEPT")) & bit:
                 self._sticks_mode = Mode.LOITER
                 self._hold(seen)
+
+    def _watch_link(self, seen: Observation) -> None:
+        """A ground station that was there and went: NAV_DLL_ACT after a Hold, if that is not 0."""
+        if seen.has_ground_station:
+            if self._link_mode is not None and self._hold_until_s is not None:
+                self._link_mode = self._hold_until_s = None
+        elif self._had_ground_station and int(self._parameters.get("NAV_DLL_ACT")):
+            self._link_mode = Mode.LOITER
+            self._hold(seen)
+        self._had_ground_station = seen.has_ground_station
 
     def _watch_battery(self, seen: Observation, *, is_flying: bool) -> None:
         """PX4's three battery levels (BAT_LOW_THR, BAT_CRIT_THR, BAT_EMERGEN_THR), by COM_LOW_BAT_ACT."""
