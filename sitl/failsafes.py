@@ -19,6 +19,9 @@ _LOSS_ACTIONS = {1: Mode.LOITER, 2: Mode.RTL}  # NAV_RCL_ACT, NAV_DLL_ACT; all e
 _OFFBOARD_ACTIONS = {3: Mode.RTL, 4: Mode.LAND, 5: Mode.LOITER}  # COM_OBL_RC_ACT; the others need sticks
 
 
+_BATTERY_LEVELS = ("BAT_LOW_THR", "BAT_CRIT_THR", "BAT_EMERGEN_THR")
+
+
 class Failsafe(enum.Enum):
     """Why the autopilot acts against the intended mode."""
 
@@ -204,11 +207,11 @@ class Failsafes:
 
     def _watch_battery(self, seen: Observation, *, is_flying: bool) -> None:
         """PX4's three battery levels (BAT_LOW_THR, BAT_CRIT_THR, BAT_EMERGEN_THR), by COM_LOW_BAT_ACT."""
-        get = self._parameters.get
-        levels = sum(seen.battery < get(f"BAT_{level}_THR") for level in ("LOW", "CRIT", "EMERGEN"))
-        warning = BatteryWarning(levels)
-        if warning > self.warning:
-            self.warning = warning
+        n_below = 0
+        for name in _BATTERY_LEVELS:
+            n_below += seen.battery < self._parameters.get(name)
+        if n_below > self.warning:
+            self.warning = BatteryWarning(n_below)
             self._tell_battery(seen)
             if is_flying:
                 self._react_to_battery(seen)
