@@ -5,13 +5,13 @@ No sockets, threads or wall clock: time is the autopilot's own, and the same inp
 
 import math
 from collections import deque
-from dataclasses import replace
 
 from sitl.battery import Battery
 from sitl.commander import Commander
-from sitl.control import AttitudeControl, Estimate, PositionControl, Setpoint, attitude_of
+from sitl.control import Estimate, Setpoint
 from sitl.estimator import Estimator
 from sitl.failsafes import Failsafe, Observation
+from sitl.flight_control import FlightControl
 from sitl.flight_tasks import Return, Takeoff
 from sitl.modes import Answer, Landed, Mode, Severity
 from sitl.navigator import Navigator, Situation
@@ -20,7 +20,7 @@ from sitl.pilot import Pilot, Sticks
 from sitl.place import Home, Origin
 from sitl.positioning import Positioning
 from sitl.preflight import Preflight
-from sitl.takeoff_landing import LandDetector, Ramp, TakeoffRamp
+from sitl.takeoff_landing import LandDetector, Ramp
 from sitl.vehicle import Vector, Vehicle, euler_of
 from sitl.wind import Wind
 
@@ -63,21 +63,18 @@ class SimAutopilot:
         self._estimator = Estimator(seed, is_noisy=is_noisy)
         self.estimate: Estimate = self._estimator.step(1e-3, self.vehicle)
         self.home: Home | None = None
-        self.setpoint: Setpoint | None = None
-        self.thrust = 0.0
         self._texts: deque[tuple[float, Severity, str]] = deque()
-        self._hover_thrust = self.vehicle.airframe.hover_thrust
-        self._land_detector = LandDetector(self._hover_thrust)
-        self._position_control = PositionControl(self.parameters, self._hover_thrust)
-        self._attitude_control = AttitudeControl(self.parameters)
+        hover_thrust = self.vehicle.airframe.hover_thrust
+        self._land_detector = LandDetector(hover_thrust)
+        self._control = FlightControl(self.parameters, hover_thrust)
         self._air_m_s: Vector = (0.0, 0.0, 0.0)
         self._was_landing = False
         self._was_armed = False
-        self._ramp = TakeoffRamp(self.parameters)
         self._setpoint_s: float | None = None
-        self._station_s: float | None = None
         self._has_taken_off = False
-        self._pilot = Pilot(self.parameters)
+        self._pilot = Pilot(self.parameters, speed)
+        self._speed = speed
+        self._ground_station_s = -math.inf
         self._navigator = Navigator(self.parameters, self.origin, self._pilot, self._say_later)
         self._stick_mode = self.mode
         self._preflight = Preflight(self.parameters, self.say)
@@ -100,6 +97,16 @@ class SimAutopilot:
     def failsafe(self) -> Failsafe | None:
         """Why the autopilot acts against the intended mode; None when it does not."""
         return self.commander.failsafe
+
+    @property
+    def setpoint(self) -> Setpoint | None:
+        """What the flight task asks of the controllers; None on the ground."""
+        return self._control.setpoint
+
+    @property
+    def thrust(self) -> float:
+        """The thrust that is asked of the motors, 0 to 1."""
+        return self._control.thrust
 
     @property
     def landed(self) -> Landed:
@@ -179,10 +186,6 @@ class SimAutopilot:
         # PX4's commander sees a fresh stream at once: MAVSDK sends a setpoint and the mode change in one go.
         self.commander.see_setpoint()
 
-    def hear_station(self) -> None:
-        """A ground station's heartbeat came (HEARTBEAT of MAV_TYPE_GCS)."""
-        self._station_s = self.boot_s
-
     def set_sticks(self, pitch: float, roll: float, throttle: float, yaw: float) -> None:
         """Take a pilot's sticks (MANUAL_CONTROL): pitch forward, roll and yaw right -1 to 1, throttle 0 to 1.
 
@@ -190,11 +193,14 @@ class SimAutopilot:
         """
         self._pilot.take(Sticks(pitch, roll, throttle, yaw), self.boot_s)
 
+    def see_ground_station(self) -> None:
+        """A ground station's heartbeat has just come; without one for COM_DL_LOSS_T it counts as gone."""
+        self._ground_station_s = self.boot_s
+
     def set_parameter(self, name: str, value: float | int) -> None:
         """Write a parameter; raises KeyError, TypeError and ValueError as Parameters.set does."""
         self.parameters.set(name, value)
-        self._position_control.tune(self.parameters)
-        self._attitude_control.tune(self.parameters)
+        self._control.tune()
 
     def drain_texts(self) -> list[tuple[Severity, str]]:
         """The autopilot's status texts since the last call, oldest first."""
@@ -221,17 +227,17 @@ class SimAutopilot:
         self._preflight.step(dt_s, self.boot_s, has_gps=self.has_gps, is_armed=commander.is_armed)
         self._was_armed = commander.is_armed
         self._follow_mode()
-        self._ramp.step(
+        self._control.prepare(
             dt_s,
             is_armed=commander.is_armed,
             wants_takeoff=self._navigator.wants_takeoff(self.estimate),
             is_landed=self._land_detector.is_landed,
         )
-        thrust, torque = self._control(dt_s)
-        self.thrust = thrust
+        has_let_go = self._land_detector.has_let_go
+        torque = self._control.step(dt_s, self._navigator.task, self.estimate, vehicle.height_m, has_let_go=has_let_go)
         airspeed_m_s = math.dist(vehicle.velocity_m_s, self._air_m_s)
         self._air_m_s = self.wind.step(dt_s, vehicle.height_m, airspeed_m_s)
-        vehicle.step(dt_s, thrust, torque, self._air_m_s)
+        vehicle.step(dt_s, self.thrust, torque, self._air_m_s)
         self.battery.step(dt_s, vehicle.power_w)
         drain_s = self.parameters.get("SIM_BAT_DRAIN")
         if drain_s > 0 and commander.is_armed:
@@ -250,28 +256,6 @@ class SimAutopilot:
             self._stick_mode = self.mode
             self._pilot.rest()
 
-    def _control(self, dt_s: float) -> tuple[float, Vector]:
-        """Thrust 0 to 1 and torques -1 to 1 of this step."""
-        state, task = self._ramp.state, self._navigator.task
-        if state in (Ramp.DISARMED, Ramp.SPOOLUP, Ramp.READY) or task is None:
-            self._position_control.reset()
-            self._attitude_control.reset()
-            self.setpoint = None
-            return (0.0 if state is Ramp.DISARMED else 0.001), (0.0, 0.0, 0.0)
-        if state is Ramp.RAMPUP and isinstance(task, Takeoff) and self._ramp.max_up_m_s(1.0) < 0.0:
-            task.wait()
-        setpoint = task.step(dt_s, self.estimate, self.vehicle.height_m)
-        if state is Ramp.RAMPUP:
-            setpoint = replace(setpoint, max_up_m_s=self._ramp.max_up_m_s(setpoint.max_up_m_s))
-        self.setpoint = setpoint
-        if self._land_detector.has_let_go:
-            self._position_control.reset()
-            return self.parameters.get("MPC_THR_MIN"), (0.0, 0.0, 0.0)
-        thrust = self._position_control.step(dt_s, setpoint, self.estimate)
-        wanted = attitude_of(thrust, setpoint.yaw_rad)
-        torque = self._attitude_control.step(dt_s, wanted, self.estimate.quaternion, self.estimate.rates_rad_s)
-        return math.sqrt(thrust[0] ** 2 + thrust[1] ** 2 + thrust[2] ** 2), torque
-
     def _follow_mode(self) -> None:
         """Fly the mode's task, and go on after a take-off."""
         task = self._navigator.task
@@ -289,7 +273,7 @@ class SimAutopilot:
         )
 
     def _detect_landing(self, dt_s: float) -> None:
-        detector, ramp = self._land_detector, self._ramp.state
+        detector, ramp = self._land_detector, self._control.ramp
         was_landed, was_landing = detector.is_landed, self._was_landing
         if not self.is_armed:
             detector.rest()
@@ -320,13 +304,14 @@ class SimAutopilot:
         return Observation(
             boot_s=self.boot_s,
             setpoint_age_s=None if self._setpoint_s is None else self.boot_s - self._setpoint_s,
-            station_age_s=None if self._station_s is None else self.boot_s - self._station_s,
             is_landed=self._land_detector.is_landed,
             landed_s=self._land_detector.landed_s,
             has_taken_off=self._has_taken_off,
             battery=self.battery.remaining,
             is_position_valid=self.is_position_valid,
             has_sticks=self.sticks is not None,
+            has_ground_station=self.boot_s - self._ground_station_s
+            < self.parameters.get("COM_DL_LOSS_T") * self._speed,
             is_stick_moving=self._pilot.is_moving,
             distance_m=distance_m,
             height_m=height_m,

@@ -15,9 +15,11 @@ Say = Callable[[Severity, str], None]
 
 _TEXT_GAP_S = 2.1  # PX4's health report, and with it the arming checks, follow at most this often
 _FENCE_ACTIONS = {2: Mode.LOITER, 3: Mode.RTL, 5: Mode.LAND}  # GF_ACTION; 4, terminate, is not modelled
-_STATION_ACTIONS = {1: Mode.LOITER, 2: Mode.RTL, 3: Mode.LAND}  # NAV_DLL_ACT
-_STICKS_ACTIONS = {1: Mode.LOITER, 2: Mode.RTL}  # NAV_RCL_ACT; all else lands
+_LOSS_ACTIONS = {1: Mode.LOITER, 2: Mode.RTL}  # NAV_RCL_ACT, NAV_DLL_ACT; all else lands
 _OFFBOARD_ACTIONS = {3: Mode.RTL, 4: Mode.LAND, 5: Mode.LOITER}  # COM_OBL_RC_ACT; the others need sticks
+
+
+_BATTERY_LEVELS = ("BAT_LOW_THR", "BAT_CRIT_THR", "BAT_EMERGEN_THR")
 
 
 class Failsafe(enum.Enum):
@@ -25,8 +27,8 @@ class Failsafe(enum.Enum):
 
     OFFBOARD_LOSS = "offboard loss"
     POSITION_LOSS = "position loss"
-    STATION_LOSS = "station loss"
     STICKS_LOSS = "sticks loss"
+    LINK_LOSS = "ground station loss"
     FENCE = "fence"
     BATTERY = "battery"
 
@@ -45,8 +47,7 @@ class Observation:
     """What the commander looks at: boot time [s], age of the newest offboard setpoint [s] (None: never one), and so on.
 
     `is_landed` is the land detector's word, `landed_s` for how long, `has_taken_off` since arming; `battery` is 0 to 1;
-    `distance_m` and `height_m` are from home (0 without one). `station_age_s` is the age of the newest heartbeat of a
-    ground station, None before the first.
+    `distance_m` and `height_m` are from home (0 without one).
     """
 
     boot_s: float = 0.0
@@ -57,10 +58,10 @@ class Observation:
     battery: float = 1.0
     is_position_valid: bool = False
     has_sticks: bool = False
+    has_ground_station: bool = False
     is_stick_moving: bool = False
     distance_m: float = 0.0
     height_m: float = 0.0
-    station_age_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,14 +87,14 @@ class Failsafes:
         self._has_left_fence = False
         self._sticks_mode: Mode | None = None
         self._are_sticks_needed = False
-        self._station_mode: Mode | None = None
-        self._is_station_lost = False
+        self._link_mode: Mode | None = None
+        self._had_ground_station = False
         self._hold_until_s: float | None = None
         self._active: Reaction | None = None
 
     def release(self) -> None:
         """A person changed the mode, or the motors were disarmed: that ends every latched reaction."""
-        self._battery_mode = self._fence_mode = self._sticks_mode = self._station_mode = None
+        self._battery_mode = self._fence_mode = self._sticks_mode = self._link_mode = None
         self._hold_until_s = None
         self._active = None
         self._are_sticks_needed = False
@@ -107,7 +108,7 @@ class Failsafes:
             return None
         self._watch_fence(seen)
         self._watch_sticks(seen, intended)
-        self._watch_station(seen)
+        self._watch_link(seen)
         self._end_hold(seen)
         reaction = self._gravest(intended, seen, is_offboard_available=is_offboard_available)
         if reaction is not None and self._active is None and self._hold_until_s is None:
@@ -123,7 +124,7 @@ class Failsafes:
         for cause, mode in (
             (Failsafe.BATTERY, self._battery_mode),
             (Failsafe.STICKS_LOSS, self._sticks_mode),
-            (Failsafe.STATION_LOSS, self._station_mode),
+            (Failsafe.LINK_LOSS, self._link_mode),
             (Failsafe.FENCE, self._fence_mode),
         ):
             if mode is not None:
@@ -155,10 +156,10 @@ class Failsafes:
         self._announce()
         if self._battery_mode is not None:
             self._battery_mode = Mode.LAND if self.warning is BatteryWarning.EMERGENCY else Mode.RTL
-        if self._station_mode is not None:
-            self._station_mode = _STATION_ACTIONS.get(int(self._parameters.get("NAV_DLL_ACT")), Mode.RTL)
         if self._sticks_mode is not None:
-            self._sticks_mode = _STICKS_ACTIONS.get(int(self._parameters.get("NAV_RCL_ACT")), Mode.LAND)
+            self._sticks_mode = _LOSS_ACTIONS.get(int(self._parameters.get("NAV_RCL_ACT")), Mode.LAND)
+        if self._link_mode is not None:
+            self._link_mode = _LOSS_ACTIONS.get(int(self._parameters.get("NAV_DLL_ACT")), Mode.LAND)
 
     def _watch_fence(self, seen: Observation) -> None:
         """The cylinder around home (GF_MAX_HOR_DIST, GF_MAX_VER_DIST), by GF_ACTION."""
@@ -194,24 +195,23 @@ class Failsafes:
                 self._sticks_mode = Mode.LOITER
                 self._hold(seen)
 
-    def _watch_station(self, seen: Observation) -> None:
-        """The heartbeats of ground stations (COM_DL_LOSS_T), by NAV_DLL_ACT after a Hold; heard again, it is over."""
-        action = _STATION_ACTIONS.get(int(self._parameters.get("NAV_DLL_ACT")))
-        is_lost = seen.station_age_s is not None and seen.station_age_s > self._parameters.get("COM_DL_LOSS_T")
-        if is_lost and not self._is_station_lost and action is not None:
-            self._station_mode = Mode.LOITER
+    def _watch_link(self, seen: Observation) -> None:
+        """A ground station that was there and went: NAV_DLL_ACT after a Hold, if that is not 0."""
+        if seen.has_ground_station:
+            if self._link_mode is not None and self._hold_until_s is not None:
+                self._link_mode = self._hold_until_s = None
+        elif self._had_ground_station and int(self._parameters.get("NAV_DLL_ACT")):
+            self._link_mode = Mode.LOITER
             self._hold(seen)
-        elif not is_lost and self._station_mode is not None:
-            self._station_mode = self._hold_until_s = None
-        self._is_station_lost = is_lost
+        self._had_ground_station = seen.has_ground_station
 
     def _watch_battery(self, seen: Observation, *, is_flying: bool) -> None:
         """PX4's three battery levels (BAT_LOW_THR, BAT_CRIT_THR, BAT_EMERGEN_THR), by COM_LOW_BAT_ACT."""
-        get = self._parameters.get
-        levels = sum(seen.battery < get(f"BAT_{level}_THR") for level in ("LOW", "CRIT", "EMERGEN"))
-        warning = BatteryWarning(levels)
-        if warning > self.warning:
-            self.warning = warning
+        n_below = 0
+        for name in _BATTERY_LEVELS:
+            n_below += seen.battery < self._parameters.get(name)
+        if n_below > self.warning:
+            self.warning = BatteryWarning(n_below)
             self._tell_battery(seen)
             if is_flying:
                 self._react_to_battery(seen)

@@ -193,7 +193,7 @@ class MavlinkFace:
     def _on_heartbeat(self, message: Any) -> None:
         if message.type == dialect.MAV_TYPE_GCS:
             self._heard_s = self._autopilot.boot_s
-            self._autopilot.hear_station()
+            self._autopilot.see_ground_station()
 
     def _on_ping(self, message: Any) -> None:
         if message.target_system == 0:

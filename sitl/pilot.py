@@ -30,9 +30,10 @@ class Sticks:
 class Pilot:
     """The stream of sticks, as PX4's manual_control module sees it."""
 
-    def __init__(self, parameters: Parameters) -> None:
-        """No pilot yet."""
+    def __init__(self, parameters: Parameters, speed: float) -> None:
+        """No pilot yet. As PX4 does, COM_RC_LOSS_T is scaled by the simulation's `speed`: it stays wall time."""
         self._parameters = parameters
+        self._speed = speed
         self.sticks: Sticks | None = None
         """Where the sticks stand; None while none come."""
         self.is_moving = False
@@ -69,6 +70,9 @@ class Pilot:
 
     def step(self, boot_s: float) -> None:
         """Sticks that have not come for COM_RC_LOSS_T [s] are none."""
-        if self.sticks is not None and boot_s - self._last_s > self._parameters.get("COM_RC_LOSS_T") + _NOTICE_S:
+        if (
+            self.sticks is not None
+            and boot_s - self._last_s > self._parameters.get("COM_RC_LOSS_T") * self._speed + _NOTICE_S
+        ):
             self.sticks = None
             self.is_moving = False

@@ -122,6 +122,43 @@ def test_a_person_may_fly_on_outside_the_fence() -> None:
     assert (flight.autopilot.mode, flight.autopilot.failsafe) == (Mode.OFFBOARD, None)
 
 
+def flown_with_a_ground_station(action: int) -> Flight:
+    flight = Flight({"NAV_DLL_ACT": action, "COM_DL_LOSS_T": 5})
+    flight.take_off()
+    flight.go_offboard()
+    for _ in range(3):
+        flight.autopilot.see_ground_station()
+        flight.run(1.0)
+    return flight
+
+
+@pytest.mark.parametrize(("action", "mode"), [(0, Mode.OFFBOARD), (1, Mode.LOITER), (2, Mode.RTL), (3, Mode.LAND)])
+def test_a_lost_ground_station_is_reacted_to_by_its_parameter(action: int, mode: Mode) -> None:
+    flight = flown_with_a_ground_station(action)
+    flight.run(3.5)
+    assert flight.autopilot.mode is Mode.OFFBOARD
+    flight.run(1.0)
+    assert flight.autopilot.mode is (Mode.LOITER if action else Mode.OFFBOARD)
+    flight.run(5.0)
+    assert flight.autopilot.mode is mode
+    assert flight.autopilot.failsafe is (Failsafe.LINK_LOSS if action else None)
+
+
+def test_a_ground_station_that_comes_back_while_it_holds_ends_the_failsafe() -> None:
+    flight = flown_with_a_ground_station(2)
+    flight.run(5.0)
+    assert flight.autopilot.failsafe is Failsafe.LINK_LOSS
+    flight.autopilot.see_ground_station()
+    flight.run(0.1)
+    assert (flight.autopilot.mode, flight.autopilot.failsafe) == (Mode.OFFBOARD, None)
+
+
+def test_a_flight_without_a_ground_station_misses_none() -> None:
+    flight = offboard({"NAV_DLL_ACT": 2})
+    flight.run(15.0)
+    assert flight.autopilot.failsafe is None
+
+
 def test_a_failed_battery_warns_holds_and_lands() -> None:
     flight = offboard()
     flight.autopilot.battery.has_failed = True

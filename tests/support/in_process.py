@@ -90,7 +90,7 @@ class InProcessAutopilot:
                 act()
             if self.sim.boot_s - self._heartbeat_s >= 1.0:
                 if self.hears_us and not self._is_closed:
-                    self.sim.hear_station()  # MAVSDK's own heartbeat
+                    self.sim.see_ground_station()  # MAVSDK's own heartbeat
                 self._heartbeat_s += 1.0
                 self._heartbeat = (self.sim.mode, self.sim.is_armed)
                 self._heartbeat_failsafe = self.sim.failsafe is not None
