@@ -6,7 +6,7 @@ MISSION ?= missions/follow_line.yaml
 FLY ?= --speed 1.5
 PYTEST ?=
 
-.PHONY: fly test test-v4l2 check bench bench-vision schema diagram clean clean-v4l2
+.PHONY: fly test test-v4l2 check bench bench-vision schema diagram safety-table clean clean-v4l2
 
 fly: $(VENV)/.installed
 	$(BIN)/lineflight dry-run $(MISSION) $(FLY)
@@ -32,6 +32,9 @@ bench-vision: $(VENV)/.installed-dev
 
 schema: $(VENV)/.installed
 	$(BIN)/python -c "from mission.plan_file import schema_text; print(schema_text(), end='')" > missions/mission.schema.json
+
+safety-table: $(VENV)/.installed-dev
+	$(BIN)/python -m tests.faults.page
 
 diagram: $(VENV)/.installed
 	$(BIN)/python -m tests.docs.state_machine_page

@@ -6,6 +6,7 @@ import subprocess
 import sys
 import threading
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -74,7 +75,7 @@ class Program:
 
 
 def observe(folder: Path, task: str, how: str, *, until_landed: bool = False) -> Outcome:
-    """Fly to `task`, let the program stop there as `how` says (kill and stop: by a signal), and look what comes of it."""
+    """Fly to `task`, let the program stop there as `how` says (kill, stop: by a signal), and see what comes of it."""
     clock = ScaledClock(SPEED, time.monotonic_ns())
     sim = SimAutopilot(Vehicle(yaw_rad=START_YAW_RAD), parameters=Parameters(SETUP), speed=SPEED)
     port = free_port()
@@ -117,7 +118,9 @@ def observe(folder: Path, task: str, how: str, *, until_landed: bool = False) ->
     )
 
 
-def _step_until(sim: SimAutopilot, link: UdpLink, clock: ScaledClock, is_over, limit_s: float) -> None:  # type: ignore[no-untyped-def]  # a plain function
+def _step_until(
+    sim: SimAutopilot, link: UdpLink, clock: ScaledClock, is_over: Callable[[], bool], limit_s: float
+) -> None:
     limit_ns = time.monotonic_ns() + round(limit_s * NS_PER_S)
     while not is_over() and time.monotonic_ns() < limit_ns:
         due_s = (clock.now_ns() - clock.epoch_ns) / NS_PER_S

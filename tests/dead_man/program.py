@@ -3,7 +3,7 @@
 python -m tests.dead_man.program PORT SPEED EPOCH_NS FOLDER TASK HOW
 
 Everything is as in a flight but for the eyes, which see the line by geometry from the telemetry. It says on standard
-output when it stops: `stopped MONOTONIC_NS`. HOW is one of STOPS, or `wait`: then it only says where it is, and goes on.
+output when it stops: `stopped MONOTONIC_NS`. HOW is one of STOPS, or `wait`: then it only says so, and goes on.
 """
 
 import asyncio
@@ -26,6 +26,12 @@ from sitl.control import quaternion_of
 from tests.faults.flight import TASK_PLANS
 from tests.support.flights import LINE_HEADING_RAD, LINE_POINT_NED_M, PAPERS, KeptLog
 from tests.support.geometric_eyes import GeometricEyes, Pose
+
+
+def say(words: str) -> None:
+    """Tell who looks on."""
+    sys.stdout.write(words + "\n")
+    sys.stdout.flush()
 
 
 def spin() -> None:
@@ -64,7 +70,7 @@ async def fly(port: int, clock: ScaledClock, folder: Path, task: str, how: str) 
         return place, quaternion_of(state.roll_rad, state.pitch_rad, state.yaw_rad)
 
     def stop() -> None:
-        print(f"stopped {time.monotonic_ns()}", flush=True)
+        say(f"stopped {time.monotonic_ns()}")
         if how in STOPS:
             STOPS[how]()
 
@@ -83,7 +89,7 @@ async def fly(port: int, clock: ScaledClock, folder: Path, task: str, how: str) 
         await asyncio.gather(beating, return_exceptions=True)
         await autopilot.close()
     await journal.close()
-    print(f"ended {ended.result} {ended.reason}", flush=True)
+    say(f"ended {ended.result} {ended.reason}")
 
 
 if __name__ == "__main__":
