@@ -124,6 +124,11 @@ class Autopilot(Protocol):
         """Where the autopilot says that it flies to (POSITION_TARGET_LOCAL_NED); None while it has not said."""
         ...
 
+    @property
+    def takes_off_in_offboard(self) -> bool:
+        """Whether its own take-off shows as offboard, as ArduCopter's does; known once connected."""
+        ...
+
     def drain_status_texts(self) -> list[str]:
         """The autopilot's own words since the last call, oldest first."""
         ...

@@ -52,6 +52,7 @@ _IDENTIFY_POLL_S = 0.2
 _AUTOPILOT_COMPONENT = 1  # MAV_COMP_ID_AUTOPILOT1
 _FAILSAFE_STATES = (5, 6)  # MAV_STATE_CRITICAL, MAV_STATE_EMERGENCY
 _TELEMETRY_RATE_HZ = 50.0
+_STATUS_RATE_HZ = 5.0
 _BATTERY_RATE_HZ = 2.0
 
 _MODES = {
@@ -100,7 +101,9 @@ class MavsdkAutopilot:
         self._reading: asyncio.Task[float] | None = None
         self._telemetry: Any = None
         self._target: Setpoint | None = None
+        self._kind = AutopilotKind.UNKNOWN
         self._newest: dict[str, Any] = {"connected": True, "battery": None, "failsafe": False}
+        self._is_deaf = False
         self._position_ns = 0
         self._attitude_ns = 0
         self._status_texts: list[str] = []
@@ -128,10 +131,15 @@ class MavsdkAutopilot:
             is_armed=newest["armed"],
             landed=_LANDED.get(newest["landed"], LandedState.UNKNOWN),
             battery=newest["battery"],
-            is_connected=newest["connected"],
+            is_connected=newest["connected"] and not self._is_deaf,
             is_failsafe=newest["failsafe"],
             is_position_ok=self._is_position_ok(),
         )
+
+    @property
+    def takes_off_in_offboard(self) -> bool:
+        """Whether its own take-off shows as offboard, as ArduCopter's does; known once connected."""
+        return self._kind is AutopilotKind.ARDUPILOT
 
     @property
     def target(self) -> Setpoint | None:
@@ -195,15 +203,23 @@ class MavsdkAutopilot:
             (direct.subscribe_message("POSITION_TARGET_LOCAL_NED"), self._take_target),
         ]
         self._subscriptions = [asyncio.create_task(self._pump(stream, take)) for stream, take in streams]
-        await self._call("set the rate of positions", telemetry.set_rate_position_velocity_ned(_TELEMETRY_RATE_HZ))
-        await self._call("set the rate of attitudes", telemetry.set_rate_attitude_euler(_TELEMETRY_RATE_HZ))
-        await self._call("set the rate of battery reports", telemetry.set_rate_battery(_BATTERY_RATE_HZ))
+        # ArduPilot streams nothing that was not asked for.
+        rates: list[tuple[str, Callable[[float], Awaitable[None]], float]] = [
+            ("positions", telemetry.set_rate_position_velocity_ned, _TELEMETRY_RATE_HZ),
+            ("attitudes", telemetry.set_rate_attitude_euler, _TELEMETRY_RATE_HZ),
+            ("landed states", telemetry.set_rate_landed_state, _STATUS_RATE_HZ),
+            ("health reports", telemetry.set_rate_health, _STATUS_RATE_HZ),
+            ("global positions", telemetry.set_rate_position, _STATUS_RATE_HZ),
+            ("battery reports", telemetry.set_rate_battery, _BATTERY_RATE_HZ),
+        ]
+        for what, set_rate, rate_hz in rates:
+            await self._call(f"set the rate of {what}", set_rate(rate_hz))
 
     async def identify(self) -> Identity:
         """Ask who flies the vehicle, once connected; an autopilot that does not tell is UNKNOWN, not an error."""
         loop = asyncio.get_running_loop()
         limit_s = loop.time() + IDENTIFY_TIMEOUT_S
-        kind = _KINDS.get(await self._system.autopilot_type(), AutopilotKind.UNKNOWN)
+        kind = self._kind = _KINDS.get(await self._system.autopilot_type(), AutopilotKind.UNKNOWN)
         info = InfoAsync(self._system)
         while loop.time() < limit_s:
             with contextlib.suppress(AutopilotError):  # AUTOPILOT_VERSION has not come yet
@@ -236,8 +252,13 @@ class MavsdkAutopilot:
 
     async def takeoff(self, altitude_m: float) -> None:
         """Climb to `altitude_m` above the take-off point in the autopilot's own take-off mode."""
-        await self._call("set the take-off altitude", self._action.set_takeoff_altitude(altitude_m))
-        await self._call("take off", self._action.takeoff())
+
+        async def climb() -> None:
+            await self._action.set_takeoff_altitude(altitude_m)
+            await self._action.takeoff()
+
+        # One time limit for both: a control tick must not wait longer than its guard does.
+        await self._call("take off", climb())
 
     async def start_offboard(self, setpoint: Setpoint) -> None:
         """Send `setpoint` and ask for offboard. Whether the autopilot went there shows in `state.mode`."""
@@ -293,8 +314,12 @@ class MavsdkAutopilot:
         return health is not None and health.is_local_position_ok and health.is_global_position_ok
 
     async def _pump(self, stream: AsyncIterator[Any], take: Callable[[Any], None]) -> None:
-        async for item in stream:
-            take(item)
+        try:
+            async for item in stream:
+                take(item)
+        finally:
+            # A stream that has ended tells an old truth for ever: without one of them the link is as good as lost.
+            self._is_deaf = True
 
     def _keep(self, key: str) -> Callable[[Any], None]:
         def take(item: Any) -> None:

@@ -64,8 +64,8 @@ def main() -> None:
         trace = Path(tempfile.gettempdir()) / "lineflight-fault.txt"
         trace.write_text(traceback.format_exc(), encoding="utf-8")
         sys.stderr.write(
-            f"lineflight met a fault of its own ({type(error).__name__}: {error}); "
-            f"a vehicle under its setpoints was told to hold. Please send {trace} to the developers.\n"
+            f"lineflight met a fault of its own ({type(error).__name__}: {error}); a vehicle that was under its "
+            f"setpoints has been told to hold. Please send {trace} to the developers.\n"
         )
         sys.exit(EXIT_FAULT)
 
@@ -172,7 +172,7 @@ def resume(
     as_json: JsonOption = False,
 ) -> None:
     """Take an interrupted mission up again, from its journal: after a crash, a takeover, or a change of battery."""
-    from mission.journal import JournalError, newest_journal, read_journal
+    from mission.journal import DRY_RUN, JournalError, newest_journal, read_journal
     from mission.resumption import CannotResumeError, explain_resumption, find_resumption
 
     try:
@@ -187,7 +187,7 @@ def resume(
         typer.echo(line, err=not explain)
     if explain:
         return
-    if begin.camera == "dry-run" and camera is None and connection is None:
+    if begin.camera == DRY_RUN and camera is None and connection is None:
         _fail("That was a dry-run: its vehicle is gone. To try it, fly with lineflight sitl and run.", EXIT_BAD_INPUT)
     _run(mission_file, connection or begin.connection, camera or begin.camera, log, as_json, (remaining, resumption))
 

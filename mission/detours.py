@@ -32,15 +32,19 @@ class Detour:
     clear_since_ns: int | None = None
 
     def next(
-        self, now_ns: int, decision: tuple[Hazard, Reaction] | None, hold_limit_s: float
+        self, now_ns: int, decision: tuple[Hazard, Reaction] | None, *, hold_limit_s: float, search_limit_s: float
     ) -> Literal["step", "wait", "carry_on", "too_long"]:
         """What to do in this tick: step its task, keep still, go on with the mission's task, or end the mission.
 
-        `decision` asks for a pause, if for anything. A search and a rejoining end by themselves, and keep still while
-        something else asks them to hold; what holds the vehicle longer than `hold_limit_s` ends the mission.
+        `decision` asks for a pause, if for anything. A hold is over when nothing asks to hold any more; what else may
+        be wrong, such as a lost line, is for the task to meet. A search and a rejoining end by themselves, and keep
+        still while something asks them to hold. What holds the vehicle longer than `hold_limit_s`, or searches longer
+        than `search_limit_s`, ends the mission.
         """
         is_hold = self.reaction in _HOLDS
-        if decision is None or not (is_hold or decision[1] in _HOLDS):
+        if self.reaction is Reaction.SEARCH and now_ns - self.started_ns > search_limit_s * NS_PER_S:
+            return "too_long"
+        if decision is None or decision[1] not in _HOLDS:
             return self._step_or_carry_on(now_ns) if is_hold else self._free()
         self.clear_since_ns = None
         if self.held_since_ns is None:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from drivers.camera.camera import Intrinsics
 from drivers.clock import NS_PER_S, Clock
 from mission import machine as m
-from mission.autopilot import Autopilot, AutopilotError, FlightMode, Setpoint, VehicleState
+from mission.autopilot import Autopilot, AutopilotError, Setpoint, VehicleState
 from mission.build import (
     build_task,
     fence,
@@ -26,14 +26,15 @@ from mission.checks import Check
 from mission.detours import Detour, detour_task
 from mission.eyes import Eyes
 from mission.hazards import TaskView, find_hazards
-from mission.helm import Helm, UnsafeSetpointError
+from mission.helm import Helm, TakenOverError, UnsafeSetpointError
 from mission.limits import floor_m
 from mission.logbook import Logbook
 from mission.plan import MissionPlan
 from mission.preflight import wait_until_ready
+from mission.preflight_checks import is_handed_over, not_at_rest
 from mission.records import Event, MissionEnded, PreflightCheck, Result, Severity, TaskEnded, TaskStarted
 from mission.reporting import FlightLog, Progress
-from mission.resumption import Resumption
+from mission.resumption import Resumption, plan_to_reckon
 from mission.safety import PAUSES, Hazard, Reaction, decide, keep_going_down, way_down
 from mission.situation import Computer, Situation, Troubles
 from mission.tasks.go_down import GoDownTask
@@ -107,13 +108,15 @@ class Executive:
         self._task: Task | None = None
         self._detour: Detour | None = None
         self._rejoin_at = Setpoint(0.0, 0.0, 0.0, 0.0)
+        self._begins_flying = False
+        self._stand = Setpoint(0.0, 0.0, 0.0, 0.0)
         self._task_started_ns = 0
         self._may_be_over_line = False
         self._noted: set[Hazard] = set()
         self._end: tuple[Result, str] = (Result.FAILED, "")
         self.progress = Progress(m.PREFLIGHT, None, None, None)
         self.tick_s: float | None = None
-        """When the last control tick began, in the event loop's time [s]; None before and after the flight."""
+        """When the last control tick began, in the event loop's time [s]; None before the first."""
 
     @property
     def may_have_armed(self) -> bool:
@@ -136,11 +139,9 @@ class Executive:
             except BaseException:
                 # Cancelled, or a bug: no stream of setpoints may outlive us. In its own modes it holds by itself.
                 if self._helm.modes.is_offboard:
-                    with contextlib.suppress(AutopilotError):
-                        await self._autopilot.hold()
+                    with contextlib.suppress(AutopilotError, TakenOverError):
+                        await self._helm.hold()
                 raise
-            finally:
-                self.tick_s = None
             ended = MissionEnded(self._clock.now_ns(), *self._end)
         self._log.record(ended)
         return ended
@@ -156,7 +157,7 @@ class Executive:
             self._autopilot,
             self._crew.eyes,
             self._clock,
-            self._plan,
+            self._plan if self._resumption is None else plan_to_reckon(self._plan, self._resumption.index),
             lambda: self._crew.computer().free_disk_bytes,
             lambda: self._situation.is_interrupted,
             tell,
@@ -186,30 +187,37 @@ class Executive:
         if self._resumption is not None:
             if origin is None:
                 return "the autopilot does not tell where on Earth it is, so that the mission cannot be resumed"
-            if state.is_armed:
+            self._begins_flying = is_handed_over(state)
+            if self._begins_flying:
                 self._resumption = self._resumption.in_the_air(self._plan)
-            refusal = self._resumption.refusal(self._plan, state, vehicle_uid)
+                self._helm.modes.begin(state.mode)
+            is_flying = self._begins_flying
+            refusal = self._resumption.refusal(self._plan, state, vehicle_uid, origin, is_flying=is_flying)
             if refusal is not None:
                 return refusal
-            memory, self._rejoin_at = self._resumption.locate(origin, here)
+            memory, self._rejoin_at = self._resumption.locate(origin, here, is_flying=is_flying)
         else:
             theta_0_rad = self._guidance.theta_0_rad
             memory = FlightMemory(here, state.yaw_rad if theta_0_rad is None else theta_0_rad)
         self._situation.begin(memory)
         self._helm.start, self._helm.reference = memory.start, here
+        self._stand = here
         await self._crew.logbook.begin(origin, memory, vehicle_uid, self._resumption)
         return None
 
     # -- the control loop ----------------------------------------------------------------------------------------
 
     async def _fly(self) -> None:
-        state = self._autopilot.state
-        if self._resumption is not None and state is not None and state.is_armed:
-            self._helm.modes.accept(self._clock.now_ns(), FlightMode.HOLD)  # in which the pilot handed it over
+        if self._resumption is not None and self._begins_flying:
             await self._rejoin(self._resumption)
         else:
             await self._machine.trigger_named("advance")
             self._start_task()
+        if not self._is_as_it_was():
+            # Between the last look before the flight and now the disk was waited for: somebody was quicker.
+            self._end = (Result.TAKEN_OVER, "takeover: somebody took the vehicle before the first command")
+            await self._machine.trigger_named("give_up")
+            return
         loop = asyncio.get_running_loop()
         period_ns = round(NS_PER_S / CONTROL_RATE_HZ)
         last_ns = self._clock.now_ns()
@@ -225,6 +233,13 @@ class Executive:
             deadline_ns = max(deadline_ns + period_ns, self._clock.now_ns())
             await asyncio.sleep(self._clock.wall_s((deadline_ns - self._clock.now_ns()) / NS_PER_S))
 
+    def _is_as_it_was(self) -> bool:
+        """Whether the vehicle still stands at rest, or still hovers as it was handed over."""
+        state = self._autopilot.state
+        if state is None:
+            return False
+        return is_handed_over(state) if self._begins_flying else not_at_rest(state) is None
+
     async def _tick(self, now_ns: int, dt_s: float) -> None:
         state = self._autopilot.state
         if state is None or self._task is None:
@@ -232,13 +247,19 @@ class Executive:
         situation = self._situation
         sight = situation.look(now_ns, dt_s, state, self._helm)
         self._show(state)
-        self._crew.logbook.note(self._clock.now_ns(), self._machine.task_index, self._task.progress, state)
+        if self._detour is None:
+            # Where a pause, a search or a pilot has left the vehicle is not where the task stands.
+            is_ours = self._helm.modes.is_offboard and self._machine.state != m.GOING_DOWN
+            self._stand = self._helm.reference if is_ours else self._stand
+            self._crew.logbook.note(now_ns, self._machine.task_index, self._task.progress, self._stand)
         if await self._react(now_ns, state):
             return
         flown = self._task if self._detour is None else self._detour.task
         try:
             step = flown.step(self._helm.reference, Observation(dt_s, state, sight))
             await self._helm.do(step, state)
+        except TakenOverError:
+            return  # the next tick says so
         except AutopilotError as error:
             self._note_refusal(str(error))
             return
@@ -246,7 +267,7 @@ class Executive:
             situation.troubles.unsafe_setpoint = str(error)
             return
         except Exception as error:
-            situation.troubles.internal_error = f"{type(error).__name__} in {self._machine.state}: {error}"
+            self._note_bug(f"{type(error).__name__} in {self._machine.state}: {error}")
             return
         situation.troubles.task_failure = step.failed
         if step.done is not None:
@@ -261,6 +282,14 @@ class Executive:
             self._log.record(Event(self._clock.now_ns(), Hazard.COMMAND_REFUSED, Severity.WARNING, words))
         else:
             self._situation.troubles.refusal = words
+
+    def _note_bug(self, words: str) -> None:
+        """A bug on the way down is noted, and the way down goes on: who gave up there would leave it in the air."""
+        if not isinstance(self._task, GoDownTask):
+            self._situation.troubles.internal_error = words
+        elif Hazard.INTERNAL_ERROR not in self._noted:
+            self._noted.add(Hazard.INTERNAL_ERROR)
+            self._log.record(Event(self._clock.now_ns(), Hazard.INTERNAL_ERROR, Severity.ERROR, words))
 
     # -- tasks ---------------------------------------------------------------------------------------------------
 
@@ -307,7 +336,7 @@ class Executive:
         await self._machine.trigger_named("rejoin", towards=resumption.index)
         now_ns = self._clock.now_ns()
         self._may_be_over_line = True
-        self._set_floor(resumption.place.height_m)
+        self._set_floor(resumption.height_m)
         self._task_started_ns = now_ns
         self._task = build_task(self._plan.tasks[resumption.index], self._guidance, self._situation.memory)
         transit_down_m = self._situation.memory.start.down_m - resumption.transit_height_m
@@ -350,12 +379,21 @@ class Executive:
         decision = decide(hazards, self._reactions, is_offboard=self._helm.modes.is_offboard)
         self._note_hazards(now_ns, hazards, decision)
         if self._detour is not None and (decision is None or decision[1] in PAUSES):
-            action = self._detour.next(now_ns, decision, self._plan.safety.hold_limit_s)
+            detour, safety = self._detour, self._plan.safety
+            action = detour.next(
+                now_ns,
+                decision,
+                hold_limit_s=safety.hold_limit_s,
+                search_limit_s=safety.line_search.time_limit_s,
+            )
             if action == "carry_on":
-                await self._carry_on(f"{self._detour.hazard} is over")
-            if action != "too_long" or decision is None:
+                await self._carry_on(f"{detour.hazard} is over")
+            if action != "too_long":
                 return action != "step"
-            hazard, reaction = decision[0], Reaction.LAND_CLEAR
+            asking = decision[0] if decision is not None else detour.hazard
+            hazard, reaction = asking or Hazard.TASK_TIMED_OUT, Reaction.LAND_CLEAR
+            lasted_s = (now_ns - detour.started_ns) / NS_PER_S
+            hazards.setdefault(hazard, f"not over after {lasted_s:.0f} s")
         elif decision is None:
             return False
         else:
@@ -370,7 +408,7 @@ class Executive:
 
     async def _end_early(self, now_ns: int, hazard: Hazard, reaction: Reaction, words: str) -> None:
         """End the mission: give up control, or go down."""
-        wanted, reaction = reaction, way_down(reaction, may_be_over_line=self._may_be_over_line)
+        reaction = way_down(reaction, may_be_over_line=self._may_be_over_line)
         self._log.record(Event(now_ns, hazard, Severity.ERROR, words, reaction))
         self._end = (_RESULTS.get(hazard, Result.FAILED), f"{hazard.replace('_', ' ')}: {words}")
         await self._end_task(*self._end)
@@ -378,7 +416,7 @@ class Executive:
             # Touch nothing more: the pilot, or the autopilot's own failsafe, has the vehicle.
             await self._machine.trigger_named("give_up" if self._end[0] is Result.TAKEN_OVER else "lose")
         else:
-            await self._go_down(hazard, wanted, reaction)
+            await self._go_down(hazard, reaction)
 
     def _note_hazards(self, now_ns: int, hazards: dict[Hazard, str], decision: tuple[Hazard, Reaction] | None) -> None:
         """Log each hazard that is not the one reacted to, once."""
@@ -408,23 +446,26 @@ class Executive:
             failure=self._situation.troubles.task_failure,
         )
 
-    async def _go_down(self, hazard: Hazard, wanted: Reaction, reaction: Reaction) -> None:
-        """End the mission early: hold for a moment, then land or return; `wanted` is the reaction unresolved."""
+    async def _go_down(self, hazard: Hazard, reaction: Reaction) -> None:
+        """End the mission early: hold for a moment, then land or return."""
         await self._machine.trigger_named("go_down")
         self._situation.troubles = Troubles()
         self._detour = None
         self._task_started_ns = self._clock.now_ns()
-        if not self.may_have_armed:
+        if not (self._helm.was_told_to_arm or self._begins_flying):
             await self._machine.trigger_named(_TRIGGERS[self._end[0]])
             return
+        task, memory = self._task, self._situation.memory
+        if isinstance(task, GoDownTask):  # it is on its way: nothing is gained by another one
+            if hazard is Hazard.TASK_TIMED_OUT:
+                self._task = GoDownTask(task.command, memory)
+            return
         command = Command.LAND if reaction is Reaction.LAND else Command.RETURN
-        task = self._task
-        is_healthy = hazard not in (Hazard.INTERNAL_ERROR, Hazard.TASK_TIMED_OUT)
-        if isinstance(task, GoDownTask) and is_healthy and (wanted is Reaction.LAND_CLEAR or task.command is command):
-            return  # it is on that way already
-        self._task = GoDownTask(command, self._situation.memory, PAUSE_BEFORE_GOING_DOWN_S)
+        self._task = GoDownTask(command, memory, PAUSE_BEFORE_GOING_DOWN_S)
         try:
             await self._helm.hold()
+        except TakenOverError:
+            return  # the next tick says so
         except AutopilotError as error:  # then the way down is all the more urgent, and goes on
             self._note_refusal(str(error))
 
@@ -447,7 +488,7 @@ class Executive:
     async def _before_change(self, source: str, target: str) -> None:
         """The journal has it before it happens."""
         progress = 0.0 if self._task is None else self._task.progress
-        await self._crew.logbook.transition(source, target, self._machine.task_index, progress, self._autopilot.state)
+        await self._crew.logbook.transition(source, target, self._machine.task_index, progress, self._stand)
 
     def _after_change(self, state: str) -> None:
         before = self.progress

@@ -127,8 +127,8 @@ async def fly(
             recorder.record(setup.true_line)
         eyes.start()
         with _stop_signals(executive.request_stop):
+            beating = asyncio.create_task(guard.beat(lambda: executive.tick_s))
             sides = [
-                asyncio.create_task(guard.beat(lambda: executive.tick_s)),
                 asyncio.create_task(surroundings.watch()),
                 asyncio.create_task(_every(_PROGRESS_RATE_HZ, 1.0, lambda: on_progress(executive.progress))),
             ]
@@ -142,8 +142,12 @@ async def fly(
                 for side in sides:
                     side.cancel()
                 await asyncio.gather(*sides, return_exceptions=True)
-                await autopilot.close()
-                eyes.stop()
+                try:
+                    await autopilot.close()
+                finally:  # guarded until the stream of setpoints has ended
+                    beating.cancel()
+                    await asyncio.gather(beating, return_exceptions=True)
+                    eyes.stop()
                 await journal.close()
         on_progress(executive.progress)
     return FlightOutcome(ended, executive.may_have_armed, path, recorder.failure)

@@ -17,10 +17,11 @@ SILENCE_LIMIT_S = 0.4
 """With the guard's own slices and the end of a process, the stream of setpoints has ended half a second later."""
 
 TICK_LIMIT_S = 7.0
-"""A control tick may wait this long for an answer (each command has its own limit, 5 s); then it counts as hung too."""
+"""A control tick may wait this long: a command has 5 s, a transition in the journal one. Then it counts as hung too."""
 
 _PERIOD_S = 0.05
 _START_LIMIT_S = 10.0
+_END_LIMIT_S = 2.0
 
 
 class GuardError(Exception):
@@ -47,6 +48,7 @@ class Guard:
             assert self._process.stdin is not None and self._process.stdout is not None  # noqa: S101, PT018  # for mypy
             os.set_blocking(self._process.stdin.fileno(), False)
             if not select.select([self._process.stdout], [], [], _START_LIMIT_S)[0] or not self._process.stdout.read(1):
+                self._process.kill()
                 raise GuardError("the guard of the control loop did not start; try again, and report it if it stays")
         except OSError as error:
             raise GuardError(f"the guard of the control loop cannot be started ({error.strerror})") from None
@@ -61,7 +63,11 @@ class Guard:
             if stream is not None:
                 with contextlib.suppress(OSError):
                     stream.close()
-        self._process.wait()
+        try:
+            self._process.wait(_END_LIMIT_S)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            self._process.wait()
 
     async def beat(self, last_tick_s: Callable[[], float | None]) -> None:
         """Beat until cancelled; from the first control tick on the guard counts on it.

@@ -4,7 +4,7 @@ import math
 from dataclasses import dataclass
 
 from drivers.clock import NS_PER_S
-from mission.autopilot import LandedState, VehicleState
+from mission.autopilot import VehicleState
 from mission.mode_watch import ModeView
 from mission.safety import PRIORITY, Hazard
 
@@ -102,8 +102,8 @@ class SafetyInput:
     is_interrupted: bool
 
 
-LANDED_M_S = 1.5
-"""What moves faster up or down than this has not landed."""
+FALLING_M_S = 2.0
+"""What sinks faster than this has not landed."""
 
 LATE_TICK_S = 0.25
 """A control tick that comes later than this [s, wall] is told."""
@@ -136,9 +136,9 @@ def find_hazards(seen: SafetyInput, limits: SafetyLimits) -> dict[Hazard, str]:
 
 def _of_modes(seen: SafetyInput) -> dict[Hazard, str]:
     state, modes = seen.state, seen.modes
-    # PX4 calls a vehicle landed as soon as it is disarmed, one that falls too.
-    is_down = seen.task.is_going_down and state.landed is LandedState.ON_GROUND and abs(state.v_down_m_s) < LANDED_M_S
-    if seen.was_armed and not state.is_armed and not is_down:
+    # On the way down a vehicle disarms when it has landed; where it falls, it has not.
+    may_disarm = seen.task.is_going_down and state.v_down_m_s < FALLING_M_S
+    if seen.was_armed and not state.is_armed and not may_disarm:
         return {Hazard.DISARMED: "the vehicle was disarmed before it had landed"}
     if state.mode in modes.explained:
         return {}

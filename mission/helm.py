@@ -1,6 +1,7 @@
 """The helm: does what a task wants of the autopilot, and keeps what was commanded."""
 
-from collections.abc import Awaitable
+from collections.abc import Coroutine
+from typing import Any
 
 from drivers.clock import Clock
 from mission.autopilot import Autopilot, AutopilotError, FlightMode, NoAnswerError, Setpoint, VehicleState
@@ -20,10 +21,15 @@ class UnsafeSetpointError(Exception):
     """A task wanted a setpoint that must not be sent; the message is a sentence."""
 
 
+class TakenOverError(Exception):
+    """The vehicle is in a mode that is not ours: a command now would take it from somebody."""
+
+
 class Helm:
     """Sends setpoints and commands. `reference` is the last setpoint, `modes` what our commands explain.
 
-    Its coroutines raise AutopilotError when the autopilot refuses or does not answer, and UnsafeSetpointError.
+    Its coroutines raise AutopilotError when the autopilot refuses or does not answer, UnsafeSetpointError, and
+    TakenOverError: between a decision and its command may lie a journal's disk, and a pilot is quicker.
     """
 
     def __init__(self, autopilot: Autopilot, log: FlightLog, clock: Clock, limits: SetpointLimits) -> None:
@@ -49,7 +55,8 @@ class Helm:
         if step.command is Command.ARM:
             await self._arm(state)
         elif step.command is Command.TAKEOFF:
-            await self._command(self._autopilot.takeoff(step.altitude_m), FlightMode.TAKEOFF)
+            # ArduCopter takes off in its guided mode, which is offboard to us.
+            await self._command(self._autopilot.takeoff(step.altitude_m), FlightMode.TAKEOFF, *self._takeoff_modes())
         elif step.command is Command.RETURN:
             # Its end, the landing, may be shown as LAND.
             await self._command(self._autopilot.return_home(), FlightMode.RETURN, FlightMode.LAND)
@@ -57,6 +64,9 @@ class Helm:
             await self._command(self._autopilot.land(), FlightMode.LAND)
         if step.setpoint is not None:
             await self._steer(step.setpoint, state)
+
+    def _takeoff_modes(self) -> tuple[FlightMode, ...]:
+        return (FlightMode.OFFBOARD,) if self._autopilot.takes_off_in_offboard else ()
 
     async def hold(self) -> None:
         """Hold position in the autopilot's own mode."""
@@ -89,8 +99,13 @@ class Helm:
             if self._n_missed_setpoints > MAX_MISSED_SETPOINTS:
                 raise
 
-    async def _command(self, call: Awaitable[None], *modes: FlightMode) -> None:
+    async def _command(self, call: Coroutine[Any, Any, None], *modes: FlightMode) -> None:
         """Send a command that leads to one of `modes`."""
+        state = self._autopilot.state
+        now_ns = self._clock.now_ns()
+        if state is not None and state.mode not in self.modes.explained(now_ns, state):
+            call.close()
+            raise TakenOverError
         self.modes.announce(*modes)
         await call
         self.modes.accept(self._clock.now_ns(), *modes)

@@ -6,28 +6,38 @@ line says how far the task has come. A line that a crash cut off is ignored.
 """
 
 import asyncio
+import contextlib
+import errno
+import math
 import os
 from collections.abc import Awaitable, Callable
 from pathlib import Path
-from typing import Annotated, Any, Literal, Protocol
+from typing import Annotated, Literal, Protocol
 
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, ValidationError
 
 from mission.autopilot import GlobalPoint
 
 SUFFIX = ".journal"
+DRY_RUN = "dry-run"
+"""What stands for the camera of a flight whose vehicle was simulated with it."""
+
 WRITE_LIMIT_S = 1.0
 
 
+UnixS = Annotated[float, Field(ge=0, le=1e11)]
+TaskIndex = Annotated[int, Field(ge=0)]
+
+
 class _Entry(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
 
 
 class Place(_Entry):
     """Where the vehicle was: on Earth [rad, m above mean sea level], above the take-off point [m], heading [rad]."""
 
-    latitude_rad: float
-    longitude_rad: float
+    latitude_rad: float = Field(ge=-math.pi / 2, le=math.pi / 2)
+    longitude_rad: float = Field(ge=-math.pi, le=math.pi)
     altitude_m: float
     height_m: float
     yaw_rad: float
@@ -39,10 +49,13 @@ class Place(_Entry):
 
 
 class Begin(_Entry):
-    """What is flown, by what, from where. `unix_s` is the time of day; `start` None where GPS told no origin."""
+    """What is flown, by what, from where. `unix_s` is the time of day; `start` None where GPS told no origin.
+
+    `origin` is the local frame's own: a vehicle that was not started anew in between still has the same.
+    """
 
     kind: Literal["begin"] = "begin"
-    unix_s: float
+    unix_s: UnixS
     mission: str
     mission_path: str
     mission_sha256: str
@@ -51,6 +64,7 @@ class Begin(_Entry):
     camera: str
     log: str
     start: Place | None
+    origin: Place | None
     theta_0_rad: float
     resumed: "Standing | None" = None
     """What was left when this flight took an interrupted mission up again."""
@@ -60,10 +74,10 @@ class Transition(_Entry):
     """The flight goes from one state of its machine to another. `task_index` (from 0) is of the task that it leaves."""
 
     kind: Literal["transition"] = "transition"
-    unix_s: float
+    unix_s: UnixS
     source: str
     target: str
-    task_index: int | None
+    task_index: TaskIndex | None
     progress: float
     move_until_m: float | None
     place: Place | None
@@ -73,8 +87,8 @@ class Standing(_Entry):
     """How far the task has come: metres flown, radians turned or seconds held."""
 
     kind: Literal["standing"] = "standing"
-    unix_s: float
-    task_index: int
+    unix_s: UnixS
+    task_index: TaskIndex
     progress: float
     move_until_m: float | None
     place: Place | None
@@ -107,48 +121,63 @@ async def in_thread(work: Callable[[], None]) -> None:
 
 
 class DiskJournal:
-    """A journal in a new file. `run` runs what waits for the disk; raises OSError when the file cannot be made."""
+    """A journal in a new file, made when the flight begins: one that never did leaves none to be resumed.
+
+    `run` runs what waits for the disk. Raises OSError when nothing can be written in its folder.
+    """
 
     def __init__(self, path: Path, run: Callable[[Callable[[], None]], Awaitable[None]] = in_thread) -> None:
         self.path = path
         self.failure: str | None = None
         self._run = run
         path.parent.mkdir(parents=True, exist_ok=True)
-        self._file = os.open(path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND, 0o644)
-        _sync_folder(path.parent)
+        if not os.access(path.parent, os.W_OK):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES), str(path.parent))
+        self._file: int | None = None
+        self._is_torn = False
         self._noting: asyncio.Task[None] | None = None
 
     async def write(self, entry: Begin | Transition) -> None:
         """Put an entry on the disk; returns when it is there, or after WRITE_LIMIT_S: a flight does not wait longer."""
-        await self._append(entry)
+        if self._noting is not None:  # an older note must not come after it
+            await self._noting
+        if self._file is not None or isinstance(entry, Begin):
+            await self._append(entry)
 
     def note(self, entry: Standing) -> None:
         """Put an entry on the disk soon; dropped while another is on its way."""
-        if self._noting is None or self._noting.done():
+        if self._file is not None and (self._noting is None or self._noting.done()):
             self._noting = asyncio.ensure_future(self._append(entry))
 
     async def close(self) -> None:
         """Wait for what is on its way, and close the file."""
         if self._noting is not None:
             await self._noting
-        os.close(self._file)
+        if self._file is not None:
+            os.close(self._file)
 
     async def _append(self, entry: BaseModel) -> None:
-        line = entry.model_dump_json().encode() + b"\n"
-
-        def append() -> None:
-            # One write: lines of two threads do not mix in a file that is opened for appending.
-            os.write(self._file, line)
-            os.fsync(self._file)
-
         try:
-            await self._run(append)
+            line = entry.model_dump_json().encode() + b"\n"
+            await self._run(lambda: self._put(line))
         except TimeoutError:
             self.failure = f"The journal {self.path} is not on the disk after {WRITE_LIMIT_S:g} s."
         except OSError as error:
             self.failure = f"The journal {self.path} cannot be written any more ({error.strerror})."
-        else:
-            self.failure = None
+        except ValueError as error:  # a name that is no text
+            self.failure = f"The journal {self.path} cannot hold this flight ({type(error).__name__})."
+
+    def _put(self, line: bytes) -> None:
+        if self._file is None:
+            self._file = os.open(self.path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND, 0o644)
+            _sync_folder(self.path.parent)
+        # A line that did not go on a full disk whole must not spoil the next one.
+        rest = b"\n" + line if self._is_torn else line
+        self._is_torn = True
+        while rest:
+            rest = rest[os.write(self._file, rest) :]
+        os.fsync(self._file)
+        self._is_torn = False
 
 
 class NoJournal:
@@ -168,35 +197,41 @@ class JournalError(Exception):
 
 
 def read_journal(path: Path) -> tuple[Begin, list[Transition | Standing]]:
-    """How the journal begins, and its further entries, oldest first. A last line that was cut off is left out.
+    """How the journal begins, and its further entries, oldest first. Lines that are not whole are left out.
 
-    Raises JournalError.
+    A crash cuts off the last line, and a full disk one in the middle. Raises JournalError.
     """
     try:
         text = path.read_text(encoding="utf-8", errors="replace")
-    except OSError as error:
-        raise JournalError(f"The journal {path} cannot be read ({error.strerror}).") from None
-    entries: list[Any] = []
-    lines = text.splitlines(keepends=True)
-    for number, line in enumerate(lines, start=1):
-        if not line.endswith("\n"):
-            break
-        try:
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or "no such name"
+        raise JournalError(f"The journal {path} cannot be read ({reason}).") from None
+    entries: list[Begin | Transition | Standing] = []
+    for line in text.split("\n"):
+        with contextlib.suppress(ValidationError):
             entries.append(_ENTRY.validate_json(line))
-        except ValidationError:
-            raise JournalError(f"Line {number} of {path} is not a journal's; name a *{SUFFIX} of lineflight.") from None
-    begin, *others = entries or [None]
-    if not isinstance(begin, Begin) or any(isinstance(entry, Begin) for entry in others):
-        raise JournalError(f"The journal {path} does not say which mission was flown; nothing can be resumed from it.")
+    begin = entries[0] if entries else None
+    others = [entry for entry in entries[1:] if not isinstance(entry, Begin)]
+    if not isinstance(begin, Begin) or len(others) != len(entries) - 1:
+        raise JournalError(
+            f"{path} is not a journal that says which mission was flown; name a *{SUFFIX} of lineflight run."
+        )
     return begin, others
 
 
 def newest_journal(folder: Path) -> Path:
-    """The journal in a folder that was written last. Raises JournalError where there is none."""
-    journals = sorted(folder.glob(f"*{SUFFIX}"), key=lambda path: path.stat().st_mtime)
-    if not journals:
-        raise JournalError(f"There is no *{SUFFIX} in {folder}; name the folder of your logs with --log.")
-    return journals[-1]
+    """The journal in a folder that was written last; dry-runs are left out, their vehicles are gone.
+
+    Raises JournalError where there is none.
+    """
+    found: list[tuple[float, Path]] = []
+    for path in folder.glob(f"*{SUFFIX}"):
+        with contextlib.suppress(OSError, JournalError):
+            if read_journal(path)[0].camera != DRY_RUN:
+                found.append((path.stat().st_mtime, path))
+    if not found:
+        raise JournalError(f"There is no *{SUFFIX} of a flight in {folder}; name the folder of your logs with --log.")
+    return max(found)[1]
 
 
 def _sync_folder(folder: Path) -> None:

@@ -1,10 +1,11 @@
 """The logbook: what the executive tells the journal, with places on Earth instead of the autopilot's local frame."""
 
+import math
 import time
 from dataclasses import dataclass
 
 from drivers.clock import NS_PER_S
-from mission.autopilot import GlobalPoint, Setpoint, VehicleState
+from mission.autopilot import GlobalPoint, Setpoint
 from mission.geodesy import point_at
 from mission.journal import Begin, Journal, Place, Standing, Transition
 from mission.resumption import Resumption
@@ -53,15 +54,16 @@ class Logbook:
                 camera=papers.camera,
                 log=papers.log,
                 start=self._place(memory.start),
+                origin=self._place(Setpoint(0.0, 0.0, 0.0, 0.0)),
                 theta_0_rad=memory.theta_0_rad,
                 resumed=None if resumption is None else resumption.standing,
             )
         )
 
     async def transition(
-        self, source: str, target: str, task_index: int | None, progress: float, state: VehicleState | None
+        self, source: str, target: str, task_index: int | None, progress: float, stand: Setpoint | None
     ) -> None:
-        """The flight is about to go from one state to another."""
+        """The flight is about to go from one state to another; `stand` is where its task is to be taken up again."""
         await self._journal.write(
             Transition(
                 unix_s=time.time(),
@@ -70,12 +72,12 @@ class Logbook:
                 task_index=task_index,
                 progress=self._done_before(task_index) + progress,
                 move_until_m=self._memory.move_until_m,
-                place=None if state is None else self._place(_setpoint(state)),
+                place=None if stand is None else self._place(stand),
             )
         )
 
-    def note(self, now_ns: int, task_index: int | None, progress: float, state: VehicleState) -> None:
-        """Say about once a second how far the task has come; called in every tick."""
+    def note(self, now_ns: int, task_index: int | None, progress: float, stand: Setpoint) -> None:
+        """Say about once a second how far the task has come; called in every tick of a task that is not paused."""
         is_due = self._noted_ns is None or now_ns - self._noted_ns >= _NOTE_PERIOD_S * NS_PER_S
         if task_index is None or not is_due:
             return
@@ -86,7 +88,7 @@ class Logbook:
                 task_index=task_index,
                 progress=self._done_before(task_index) + progress,
                 move_until_m=self._memory.move_until_m,
-                place=self._place(_setpoint(state)),
+                place=self._place(stand),
             )
         )
 
@@ -95,7 +97,8 @@ class Logbook:
         return resumption.standing.progress if resumption is not None and resumption.index == task_index else 0.0
 
     def _place(self, at: Setpoint) -> Place | None:
-        if self._origin is None:
+        is_known = all(map(math.isfinite, (at.north_m, at.east_m, at.down_m, at.yaw_rad)))
+        if self._origin is None or not is_known:
             return None
         point = point_at(at, self._origin)
         return Place(
@@ -105,7 +108,3 @@ class Logbook:
             height_m=self._memory.start.down_m - at.down_m,
             yaw_rad=at.yaw_rad,
         )
-
-
-def _setpoint(state: VehicleState) -> Setpoint:
-    return Setpoint(state.north_m, state.east_m, state.down_m, state.yaw_rad)

@@ -45,6 +45,10 @@ class ModeWatch:
         """Whether offboard is what was commanded last."""
         return self._wanted == {FlightMode.OFFBOARD}
 
+    def begin(self, mode: FlightMode) -> None:
+        """We take over a vehicle that flies `mode`; nothing was commanded yet, and no other mode is explained."""
+        self._modes = self._wanted = frozenset({mode})
+
     def announce(self, *modes: FlightMode) -> None:
         """A command that leads to one of `modes` is about to be sent, or the autopilot will go there by itself."""
         self._modes = frozenset(modes) if self._modes == _ANY else self._modes.union(modes)

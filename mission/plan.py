@@ -257,6 +257,7 @@ class LineSearchPlan(_Section):
     sweep_deg: float = Field(40.0, ge=0, le=90, description="Turn so far to both sides.")
     back_m: float = Field(20.0, ge=0, le=200, description="At most so far back to where the line was last seen.")
     n_detections: int = Field(4, ge=1, le=100, description="Frames in a row that find the line again.")
+    time_limit_s: TimeLimitS = Field(120.0, description="A search that takes longer has found nothing.")
 
 
 class SafetyPlan(_Section):

@@ -94,15 +94,17 @@ def _read_text(path: Path) -> str:
     def refuse(words: str) -> MissionFileError:
         return MissionFileError(path, [Problem(1, "", words)])
 
-    if path.is_dir():
-        raise refuse("this is a folder; name a mission file")
     try:
+        if path.is_dir():
+            raise refuse("this is a folder; name a mission file")
         with path.open("rb") as file:
             raw = file.read(MAX_BYTES + 1)
     except FileNotFoundError:
         raise refuse("there is no such file; missions/ holds examples") from None
     except OSError as error:
         raise refuse(f"cannot be read: {error.strerror}") from None
+    except ValueError:
+        raise refuse("no file can have this name") from None
     if len(raw) > MAX_BYTES:
         raise refuse(f"larger than {MAX_BYTES // 1024} KB, so this is not a mission file")
     try:

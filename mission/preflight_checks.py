@@ -87,7 +87,8 @@ def not_at_rest(state: VehicleState) -> str | None:
 
 def is_handed_over(state: VehicleState) -> bool:
     """Whether a pilot has left a flying vehicle hovering in hold mode, from where a mission may be resumed."""
-    return state.is_armed and state.landed is LandedState.IN_AIR and state.mode is FlightMode.HOLD
+    is_hovering = state.landed is LandedState.IN_AIR and state.mode is FlightMode.HOLD
+    return state.is_armed and is_hovering and not state.is_failsafe
 
 
 def _link(facts: Facts) -> Check:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from datetime import datetime
 
 from mission import plan as p
-from mission.autopilot import GlobalPoint, LandedState, Setpoint, VehicleState
+from mission.autopilot import GlobalPoint, Setpoint, VehicleState
 from mission.geodesy import local_of
 from mission.journal import Begin, Place, Standing, Transition
 from mission.machine import COMPLETED, FAILED, GOING_DOWN, TAKEN_OVER
@@ -14,6 +14,10 @@ from mission.plan_rules import LANDING_TASKS
 from mission.tasks.task import FlightMemory
 
 _WAYS_OUT = (GOING_DOWN, TAKEN_OVER, FAILED)
+_SAME_ORIGIN_M = 1.0
+FROM_START_M = 10.0
+"""How far from its take-off point a vehicle on the ground may take a mission up again."""
+
 _LEAST_M = 0.5
 _LEAST_S = 0.1
 
@@ -26,15 +30,18 @@ class CannotResumeError(Exception):
 class Resumption:
     """Where an interrupted mission is taken up again: at `place`, with the task and its progress that `standing` tells.
 
-    `start` is where the mission took off; its heights, its fence and its way home are measured from there. The way to
-    `place` is flown `transit_height_m` above it, as high as the mission flies anywhere: the line may lie between.
+    `start` is where the mission took off, and `origin` where the local frame had its origin then. The way to `place` is
+    flown `transit_height_m` above the start, as high as the mission flies anywhere and clear of the line: it may lie
+    between. There the vehicle goes down to `height_m`, at which the task is planned.
     """
 
     standing: Standing
     place: Place
     start: Place
+    origin: Place
     theta_0_rad: float
     vehicle_uid: str
+    height_m: float
     transit_height_m: float
 
     @property
@@ -47,29 +54,45 @@ class Resumption:
         first = plan.tasks[0]
         if self.index > 0 or not isinstance(first, p.Takeoff):
             return self
-        place = self.start.model_copy(
-            update={"height_m": first.altitude_m, "altitude_m": self.start.altitude_m + first.altitude_m}
-        )
         standing = self.standing.model_copy(update={"task_index": 1, "progress": 0.0})
-        return replace(self, standing=standing, place=place)
+        return replace(self, standing=standing, place=self.start, height_m=first.altitude_m)
 
-    def locate(self, origin: GlobalPoint, here: Setpoint) -> tuple[FlightMemory, Setpoint]:
+    def locate(self, origin: GlobalPoint, here: Setpoint, *, is_flying: bool) -> tuple[FlightMemory, Setpoint]:
         """The flight's memory, and the place to rejoin at, in the local frame that has its origin at `origin`.
 
-        `here` is where the vehicle is: the autopilot may have been started anew, and have another origin than before.
+        `here` is where the vehicle is. On the ground that is the height that counts: an autopilot that was started anew
+        has another origin, whose altitude GPS gives to some metres only.
         """
         start = local_of(self.start.point, self.start.yaw_rad, origin)
+        if not is_flying:
+            start = replace(start, down_m=here.down_m)
         at = local_of(self.place.point, self.place.yaw_rad, origin)
-        goal = Setpoint(at.north_m, at.east_m, start.down_m - self.place.height_m, at.yaw_rad)
-        return FlightMemory(start, self.theta_0_rad, self.standing.move_until_m, pad=here), goal
+        goal = Setpoint(at.north_m, at.east_m, start.down_m - self.height_m, at.yaw_rad)
+        pad = start if is_flying else here
+        return FlightMemory(start, self.theta_0_rad, self.standing.move_until_m, pad=pad), goal
 
-    def refusal(self, plan: p.MissionPlan, state: VehicleState, vehicle_uid: str) -> str | None:
+    def refusal(
+        self, plan: p.MissionPlan, state: VehicleState, vehicle_uid: str, origin: GlobalPoint, *, is_flying: bool
+    ) -> str | None:
         """Why the mission must not be taken up by a vehicle in this state, in a sentence; None where it may."""
         if self.vehicle_uid and vehicle_uid != self.vehicle_uid:
             return f"this vehicle is {vehicle_uid or 'unknown'}, but the mission was begun by {self.vehicle_uid}"
         left = plan.tasks[self.index]
-        if state.landed is LandedState.ON_GROUND and left.task in LANDING_TASKS:
+        if is_flying:
+            moved = local_of(self.origin.point, 0.0, origin)
+            if math.hypot(moved.north_m, moved.east_m, moved.down_m) > _SAME_ORIGIN_M:
+                return "the autopilot was started anew since the mission was interrupted: land, then resume"
+            return None
+        if left.task in LANDING_TASKS:
             return f"nothing is left to do: the vehicle stands on the ground, and the mission was at its {left.task}"
+        start = local_of(self.start.point, 0.0, origin)
+        away_m = math.hypot(start.north_m - state.north_m, start.east_m - state.east_m)
+        if away_m > FROM_START_M:
+            # The autopilot's way home ends where it takes off: beside the line, it would end on the line.
+            return (
+                f"the vehicle stands {away_m:.0f} m from where the mission took off; carry it back to within "
+                f"{FROM_START_M:g} m, from where its way home is clear"
+            )
         return None
 
 
@@ -85,7 +108,7 @@ def find_resumption(
         raise CannotResumeError(
             f"the mission file {begin.mission_path} has changed since; fly it from its beginning with lineflight run"
         )
-    if begin.start is None:
+    if begin.start is None or begin.origin is None:
         raise CannotResumeError("the journal does not know where on Earth the mission began")
     standing = begin.resumed or Standing(
         unix_s=begin.unix_s, task_index=0, progress=0.0, move_until_m=None, place=begin.start
@@ -102,14 +125,49 @@ def find_resumption(
         standing = _standing_after(entry, standing)
         if target in _WAYS_OUT:
             break  # what follows is the way down
-    tasks = list(plan.tasks)
     index = standing.task_index
+    if index >= len(plan.tasks):
+        raise CannotResumeError(f"the journal is at task {index + 1}, but the mission has {len(plan.tasks)}")
+    tasks = list(plan.tasks)
     tasks[index] = left_of(tasks[index], standing.progress, standing.move_until_m)
     place = standing.place or begin.start
     heights_m = [getattr(task, "altitude_m", 0.0) for task in plan.tasks]
-    transit_height_m = max(*heights_m, place.height_m)
-    resumption = Resumption(standing, place, begin.start, begin.theta_0_rad, begin.vehicle_uid, transit_height_m)
+    line_m = plan.safety.line_height_m
+    clear_m = 0.0 if line_m is None else line_m + plan.safety.min_clearance_m
+    resumption = Resumption(
+        standing,
+        place,
+        begin.start,
+        begin.origin,
+        begin.theta_0_rad,
+        begin.vehicle_uid,
+        height_m=_planned_height_m(plan, index, place.height_m),
+        transit_height_m=min(max(*heights_m, clear_m), plan.safety.max_altitude_m - 1.0),
+    )
     return plan.model_copy(update={"tasks": tasks}), resumption
+
+
+def plan_to_reckon(plan: p.MissionPlan, index: int) -> p.MissionPlan:
+    """The mission for which battery and parameters must be good: what is left, and the heights flown before."""
+    before = [task for task in plan.tasks[:index] if isinstance(task, p.Takeoff | p.Ascend | p.Descend)]
+    return plan.model_copy(update={"tasks": [*before, *plan.tasks[index:]]})
+
+
+def _planned_height_m(plan: p.MissionPlan, index: int, height_m: float) -> float:
+    """At which height a task is taken up: the one it is planned at, not where a pilot or a search left the vehicle.
+
+    A task that changes the height is taken up where it was, but not below where it began or, sinking, where it goes.
+    """
+    before_m = next((t.altitude_m for t in reversed(plan.tasks[:index]) if hasattr(t, "altitude_m")), 0.0)
+    match plan.tasks[index]:
+        case p.Ascend():
+            return max(before_m, height_m)
+        case p.Descend(altitude_m=goal_m):
+            return max(goal_m, height_m)
+        case p.Return() | p.Land():
+            return max(before_m, height_m)
+        case _:
+            return before_m
 
 
 def explain_resumption(plan: p.MissionPlan, resumption: Resumption, begin: Begin) -> list[str]:
@@ -118,9 +176,11 @@ def explain_resumption(plan: p.MissionPlan, resumption: Resumption, begin: Begin
     when = datetime.fromtimestamp(standing.unix_s).astimezone()
     lines = [
         f"mission  {begin.mission} ({begin.mission_path}), interrupted {when:%Y-%m-%d %H:%M:%S}",
-        f"vehicle  {resumption.vehicle_uid or 'unknown'}; another one is refused",
+        f"vehicle  {resumption.vehicle_uid}; another one is refused"
+        if resumption.vehicle_uid
+        else "vehicle  it told no number: see yourself that it is the same",
         f"stands   in task {resumption.index + 1}, {task.task}{_done_words(task, standing.progress)}, "
-        f"{resumption.place.height_m:.1f} m above the take-off point",
+        f"to be taken up {resumption.height_m:.1f} m above the take-off point",
     ]
     left = [each.task for each in plan.tasks[resumption.index :]]
     height_m = resumption.transit_height_m
@@ -128,9 +188,13 @@ def explain_resumption(plan: p.MissionPlan, resumption: Resumption, begin: Begin
         lines.append("resume   begins with the take-off, because that was not over")
     else:
         lines.append(
-            f"resume   on the ground: takes off, flies at {height_m:.1f} m to where it was interrupted, and goes on"
+            f"resume   on the ground, within {FROM_START_M:g} m of the take-off point: takes off, flies at "
+            f"{height_m:.1f} m to where it was interrupted, and goes on"
         )
-        lines.append(f"         hovering in hold mode: flies there from where it is, at {height_m:.1f} m, and goes on")
+        lines.append(
+            f"         hovering in hold mode: climbs straight up to {height_m:.1f} m, which must be free, flies there, "
+            "and goes on"
+        )
     lines.append("left     " + ", ".join(left))
     return lines
 

@@ -121,7 +121,6 @@ _MATTERS_ON_THE_WAY_DOWN = (
     Hazard.TAKEOVER,
     Hazard.AUTOPILOT_FAILSAFE,
     Hazard.DISARMED,
-    Hazard.INTERNAL_ERROR,
     Hazard.TASK_TIMED_OUT,
 )
 

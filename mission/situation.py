@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from drivers.camera.camera import Intrinsics
 from drivers.clock import NS_PER_S, Clock
@@ -59,6 +59,7 @@ class Situation:
         self._tracking_watch = TrackingWatch(guidance.leash_m)
         self._tracking: str | None = None
         self._position_ok_ns = 0
+        self._eyes_view = EyesView(None, None, None, 0, 0)
         self.pace = Pace()
         self.memory = FlightMemory(Setpoint(0.0, 0.0, 0.0, 0.0), 0.0)
         self.troubles = Troubles()
@@ -87,17 +88,30 @@ class Situation:
         if state.is_position_ok:
             self._position_ok_ns = now_ns
         self._log.record(state)
-        self.keep_words()
         self._tracking = self._tracking_watch.tick(dt_s, state, helm.reference, is_offboard=helm.modes.is_offboard)
         self.memory.trail.add(state)
         try:
+            self.keep_words()
+            self._eyes_view = self._view_of_eyes()
             sight = self._lookout.look(now_ns, state)
         except Exception as error:
-            self.troubles.internal_error = f"{type(error).__name__} while placing the line: {error}"
+            # Whatever fails in looking is as good as blind: a task that needs no eyes goes on without them.
+            self._eyes_view = replace(self._eyes_view, failure=f"looking fails ({type(error).__name__}: {error})")
             return None
         if sight is not None and sight.line is not None:
             self.memory.line_seen_at = Setpoint(state.north_m, state.east_m, state.down_m, state.yaw_rad)
         return sight
+
+    def _view_of_eyes(self) -> EyesView:
+        impairment = self._eyes.impairment
+        name, words = (None, None) if impairment is None else (impairment.name, impairment.message)
+        return EyesView(
+            failure=self._eyes.failure,
+            camera_gone=words if name == "camera_gone" else None,
+            camera_blind=words if name == "camera_blind" else None,
+            sight_ns=self._lookout.sight_ns,
+            line_seen_ns=self._lookout.line_seen_ns,
+        )
 
     def from_start_m(self, state: VehicleState) -> float:
         """The level distance from the take-off point [m]."""
@@ -121,21 +135,13 @@ class Situation:
 
     def safety_input(self, now_ns: int, state: VehicleState, helm: Helm, task: TaskView) -> SafetyInput:
         """All of it, as safety wants it."""
-        eyes, troubles = self._eyes, self.troubles
-        impairment = eyes.impairment
-        name, words = (None, None) if impairment is None else (impairment.name, impairment.message)
+        troubles = self.troubles
         return SafetyInput(
             now_ns=now_ns,
             state=state,
             modes=helm.modes.view(now_ns, state),
             task=task,
-            eyes=EyesView(
-                failure=eyes.failure,
-                camera_gone=words if name == "camera_gone" else None,
-                camera_blind=words if name == "camera_blind" else None,
-                sight_ns=self._lookout.sight_ns,
-                line_seen_ns=self._lookout.line_seen_ns,
-            ),
+            eyes=replace(self._eyes_view, sight_ns=self._lookout.sight_ns, line_seen_ns=self._lookout.line_seen_ns),
             computer=self._computer(),
             pace=self.pace.view,
             fence_breach=self._fence_breach(state, is_going_down=task.is_going_down),

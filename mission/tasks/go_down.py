@@ -41,7 +41,9 @@ class GoDownTask:
         state = seen.state
         if self._is_commanded and not state.is_armed and state.landed is LandedState.ON_GROUND:
             return Step(done=self._landed_words(state))
-        if self._is_commanded and state.mode in _MODES[self.command]:
+        is_on_its_way = state.mode in _MODES[self.command]
+        if is_on_its_way and (self._is_commanded or state.landed is LandedState.ON_GROUND):
+            self._is_commanded = True
             return Step()
         self._is_commanded = True
         self._wait_s = _TELEMETRY_LAG_S

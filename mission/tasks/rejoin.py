@@ -9,7 +9,7 @@ from mission.tasks.walk import Walk
 
 
 class RejoinTask:
-    """Goes there high: up first, then across, then down, so that nothing that stands between is met.
+    """Goes there high: up first, then across, then down. What is right above and right below the ends must be free.
 
     It crosses at `transit_down_m` NED, or higher where it is higher already.
     """

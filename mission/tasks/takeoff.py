@@ -9,6 +9,7 @@ _SHORT_SHARE = 0.2
 """How far below the height PX4 may end its take-off: its acceptance radius, 9.4 m of 10 were seen, and a margin."""
 
 _CORRECTION_M_S = 1.0
+_STOPPED_M_S = 0.3
 
 
 class TakeoffTask:
@@ -38,7 +39,10 @@ class TakeoffTask:
             short_m = state.down_m - (start.down_m - self._altitude_m)
             if short_m > max(_SHORT_M, _SHORT_SHARE * self._altitude_m):
                 return Step()  # a change to hold so far below is not the autopilot's own
-            if state.landed is not LandedState.IN_AIR or state.mode is not FlightMode.HOLD:
+            # PX4 goes to hold when it is up; ArduCopter stays in its guided mode, taking off as it says, and stops.
+            is_holding = state.mode is FlightMode.HOLD and state.landed is LandedState.IN_AIR
+            is_stopped = state.mode is FlightMode.OFFBOARD and abs(state.v_down_m_s) < _STOPPED_M_S
+            if not (is_holding or is_stopped):
                 return Step(next_mode=FlightMode.HOLD)
             self._is_up = True
         setpoint = step_level_towards(reference, start, _CORRECTION_M_S, seen.dt_s)

@@ -13,6 +13,7 @@ from sitl.modes import Mode
 from sitl.wind import Wind
 from tests.support.flights import Cockpit
 from tests.support.virtual_time import VirtualTimeLoop
+from vision.records import VisionReport
 
 
 @dataclass(frozen=True)
@@ -178,6 +179,13 @@ def _kill_vision(cockpit: Cockpit) -> None:
     cockpit.eyes.failure = "the vision worker ended"
 
 
+def _break_eyes(cockpit: Cockpit) -> None:
+    def fail() -> list[VisionReport]:
+        raise ValueError("a bug in looking")
+
+    cockpit.eyes.take = fail  # type: ignore[method-assign]
+
+
 def _camera(name: str, gone_s: float) -> Callable[[Cockpit], None]:
     """A camera that is gone or blind for a while; what lasts 3 s counts as dead, as mission.worker_eyes has it."""
 
@@ -257,6 +265,7 @@ FAULTS = (
     Fault("fence", "the vehicle is outside the fence", _shrink_fence),
     Fault("gale", "20 m/s of wind for 15 s", _gale),
     Fault("vision_dead", "the vision worker is dead", _kill_vision),
+    Fault("eyes_raise", "looking fails by a bug, again and again", _break_eyes),
     Fault("camera_gone", "the camera is gone for good", _camera("camera_gone", 60.0)),
     Fault("camera_flickers", "the camera is gone for 2 s", _camera("camera_gone", 2.0)),
     Fault("camera_frozen", "the camera repeats itself", _camera("camera_blind", 60.0)),

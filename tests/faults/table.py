@@ -63,6 +63,7 @@ EXPECTED = {
     "fence": "H H H H H H H H H c c",
     "gale": "H H H H c H H H H E E",
     "vision_dead": "c c c c c c H H H c c",
+    "eyes_raise": "c c c c c c H H H c c",
     "camera_gone": "c c c c c c H H H c c",
     "camera_flickers": "c c c c c c p p p c c",
     "camera_frozen": "c c c c c c H H H c c",

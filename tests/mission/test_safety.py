@@ -228,6 +228,5 @@ def test_on_the_way_down_only_who_else_has_it_and_a_way_that_fails_matter() -> N
         Hazard.TAKEOVER,
         Hazard.AUTOPILOT_FAILSAFE,
         Hazard.DISARMED,
-        Hazard.INTERNAL_ERROR,
         Hazard.TASK_TIMED_OUT,
     }

@@ -140,6 +140,10 @@ class InProcessAutopilot:
         )
 
     @property
+    def takes_off_in_offboard(self) -> bool:
+        return False
+
+    @property
     def target(self) -> Setpoint | None:
         self.catch_up()
         return self._target

@@ -27,6 +27,7 @@ _STEP_S = 0.004
 _STOP_LIMIT_S = 60.0
 _SETTLE_S = 3.0
 _LAND_LIMIT_S = 40.0
+_END_LIMIT_S = 60.0
 
 
 @dataclass(frozen=True)
@@ -49,7 +50,7 @@ class Program:
     """The flying program as a process, and what it said."""
 
     def __init__(self, port: int, clock: ScaledClock, folder: Path, task: str, how: str) -> None:
-        command = [sys.executable, "-m", "tests.dead_man.program"]
+        command = [sys.executable, "-m", "tests.over_mavlink.program"]
         arguments = [str(port), str(clock.speed), str(clock.epoch_ns), str(folder), task, how]
         self.process = subprocess.Popen(
             command + arguments, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
@@ -72,6 +73,69 @@ class Program:
             self.process.kill()
         _, errors = self.process.communicate()
         return "".join(self.words) + errors
+
+
+def is_down(sim: SimAutopilot) -> bool:
+    """Whether the vehicle stands disarmed on the ground."""
+    return not sim.is_armed and sim.vehicle.is_on_ground
+
+
+@dataclass
+class Struck:
+    """What came of a fault of the vehicle's: how the program ended, in which mode the vehicle was then, and later."""
+
+    words: str
+    mode_at_end: Mode
+    is_down: bool
+
+
+def kill_and_resume(folder: Path, mission: str, kill_s: float, away_s: float) -> Struck:
+    """Kill -9 a program `kill_s` of flight time after its start, and let another take its journal up `away_s` later."""
+    clock = ScaledClock(SPEED, time.monotonic_ns())
+    sim = SimAutopilot(Vehicle(yaw_rad=START_YAW_RAD), parameters=Parameters(SETUP), speed=SPEED)
+    port = free_port()
+    with UdpLink(MavlinkFace(sim), port) as link:
+        first = Program(port, clock, folder, mission, "wait")
+        _step_until(sim, link, clock, lambda: first.process.poll() is not None or sim.boot_s > kill_s, kill_s)
+        words = first.close()
+        back_s = sim.boot_s + away_s
+        _step_until(sim, link, clock, lambda: sim.boot_s > back_s, away_s)
+        second = Program(port, clock, folder, mission, "resume")
+        _step_until(sim, link, clock, lambda: second.process.poll() is not None, _END_LIMIT_S)
+        words += second.close()
+        mode_at_end = sim.mode
+    return Struck(words, mode_at_end, is_down(sim))
+
+
+Strike = Callable[[SimAutopilot, UdpLink], None]
+"""Does a fault to the vehicle. Called again and again until the program has ended."""
+
+
+def strike(folder: Path, task: str, do: Strike) -> Struck:
+    """Fly the mission for `task`, do something to the vehicle in it, and see how program and vehicle end."""
+    clock = ScaledClock(SPEED, time.monotonic_ns())
+    sim = SimAutopilot(Vehicle(yaw_rad=START_YAW_RAD), parameters=Parameters(SETUP), speed=SPEED)
+    port = free_port()
+    with UdpLink(MavlinkFace(sim), port) as link:
+        program = Program(port, clock, folder, task, "wait")
+        try:
+            _step_until(sim, link, clock, lambda: program.stopped_ns is not None, _STOP_LIMIT_S)
+            assert program.stopped_ns is not None, f"the program never came to {task}: {program.close()}"
+
+            def is_over() -> bool:
+                do(sim, link)
+                return program.process.poll() is not None
+
+            _step_until(sim, link, clock, is_over, _END_LIMIT_S)
+            mode_at_end = sim.mode
+        finally:
+            words = program.close()
+
+        def is_settled() -> bool:
+            return is_down(sim) or mode_at_end is sim.mode is Mode.LOITER
+
+        _step_until(sim, link, clock, is_settled, _LAND_LIMIT_S)
+    return Struck(words, mode_at_end, is_down(sim))
 
 
 def observe(folder: Path, task: str, how: str, *, until_landed: bool = False) -> Outcome:
@@ -114,7 +178,7 @@ def observe(folder: Path, task: str, how: str, *, until_landed: bool = False) ->
         None if died_ns is None else (died_ns - stopped_ns) / NS_PER_S,
         program.process.returncode,
         words,
-        not sim.is_armed and sim.vehicle.is_on_ground,
+        is_down(sim),
     )
 
 

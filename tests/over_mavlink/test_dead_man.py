@@ -9,8 +9,8 @@ from pathlib import Path
 import pytest
 
 from sitl.modes import Mode
-from tests.dead_man.observed_flight import Outcome, observe
 from tests.faults.table import TASKS
+from tests.over_mavlink.observed_flight import Outcome, observe
 
 pytestmark = pytest.mark.real_time
 

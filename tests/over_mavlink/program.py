@@ -1,9 +1,10 @@
 """A program that flies a mission over real MAVLink, and whose control loop stops in the middle of a task.
 
-python -m tests.dead_man.program PORT SPEED EPOCH_NS FOLDER TASK HOW
+python -m tests.over_mavlink.program PORT SPEED EPOCH_NS FOLDER TASK HOW
 
 Everything is as in a flight but for the eyes, which see the line by geometry from the telemetry. It says on standard
-output when it stops: `stopped MONOTONIC_NS`. HOW is one of STOPS, or `wait`: then it only says so, and goes on.
+output when it stops: `stopped MONOTONIC_NS`. HOW is one of STOPS, or `wait`: then it only says so, and goes on; or
+`resume`: then it takes up what the journal in FOLDER has left. TASK may be a mission file, which is flown to its end.
 """
 
 import asyncio
@@ -18,10 +19,12 @@ from mission.camera_plan import pinhole_intrinsics
 from mission.executive import Crew, Executive
 from mission.guard import Guard
 from mission.hazards import ComputerView
-from mission.journal import DiskJournal
+from mission.journal import DiskJournal, read_journal
 from mission.logbook import Logbook
 from mission.plan import MissionPlan
+from mission.plan_file import read_mission
 from mission.records import TaskStarted
+from mission.resumption import find_resumption
 from sitl.control import quaternion_of
 from tests.faults.flight import TASK_PLANS
 from tests.support.flights import LINE_HEADING_RAD, LINE_POINT_NED_M, PAPERS, KeptLog
@@ -50,6 +53,7 @@ def keep_the_lock() -> None:
     ctypes.PyDLL(None).sleep(1_000_000)
 
 
+JOURNAL = "flight.journal"
 STOPS = {"spin": spin, "sleep": sleep, "lock": keep_the_lock}
 AFTER_S = {"takeoff": 4.0, "return": 3.0, "land": 3.0}
 """Into a task; the others are stopped after a second, when the heartbeat has told of offboard."""
@@ -57,7 +61,10 @@ AFTER_S = {"takeoff": 4.0, "return": 3.0, "land": 3.0}
 
 async def fly(port: int, clock: ScaledClock, folder: Path, task: str, how: str) -> None:
     """Fly the mission for `task`, and stop in it."""
-    plan = MissionPlan.model_validate({"version": 1, "name": "stops", "tasks": TASK_PLANS[task]})
+    if task.endswith(".yaml"):
+        plan = read_mission(Path(task)).plan
+    else:
+        plan = MissionPlan.model_validate({"version": 1, "name": "stops", "tasks": TASK_PLANS[task]})
     camera = pinhole_intrinsics(plan.camera)
     autopilot = MavsdkAutopilot(f"udpin://127.0.0.1:{port}", clock, lambda text: None)
     loop = asyncio.get_running_loop()
@@ -78,11 +85,14 @@ async def fly(port: int, clock: ScaledClock, folder: Path, task: str, how: str) 
         if isinstance(item, TaskStarted) and item.task == task:
             loop.call_later(clock.wall_s(AFTER_S.get(task, 1.2)), stop)
 
-    journal = DiskJournal(folder / "flight.journal")
+    resumption = None
+    if how == "resume":
+        plan, resumption = find_resumption(*read_journal(folder / JOURNAL), plan, PAPERS.mission_sha256)
+    journal = DiskJournal(folder / (JOURNAL if resumption is None else "resumed.journal"))
     with Guard() as guard:
         eyes = GeometricEyes(pose, clock, camera, LINE_POINT_NED_M, LINE_HEADING_RAD)
         crew = Crew(autopilot, eyes, camera, KeptLog(on_record), Logbook(journal, PAPERS), ComputerView)
-        executive = Executive(plan, crew, clock)
+        executive = Executive(plan, crew, clock, resumption)
         beating = asyncio.create_task(guard.beat(lambda: executive.tick_s))
         ended = await executive.run()
         beating.cancel()
