@@ -59,7 +59,7 @@ class LineCamera:
                 x_px = camera.cx_px + camera.fx_px * seen[:, 0] / seen[:, 2]
                 y_px = camera.cy_px + camera.fy_px * seen[:, 1] / seen[:, 2]
                 ends = np.round(np.stack((x_px, y_px), 1) * (1 << _SHIFT)).astype(np.int32)
-                cv2.polylines(image, [ends], False, (225, 225, 225), 2, cv2.LINE_AA, _SHIFT)  # noqa: FBT003
+                cv2.polylines(image, [ends], False, (225, 225, 225), 2, cv2.LINE_AA, _SHIFT)
         return image
 
     def __enter__(self) -> Self:

@@ -1,4 +1,4 @@
-"""A flight at 1x for as long as a benchmark wants it: all that flies is real, the vehicle simulated, its pack endless."""
+"""A flight at 1x for as long as a benchmark wants: all that flies is real, the vehicle simulated, its pack endless."""
 
 import contextlib
 import functools
