@@ -2,6 +2,7 @@
 
 import contextlib
 import functools
+import math
 import multiprocessing
 import os
 import signal
@@ -11,7 +12,6 @@ from pathlib import Path
 
 from benchmarks.line_camera import LineCamera
 from drivers.clock import ScaledClock
-from mission.estimate import total
 from mission.flight import FlightSetup
 from mission.plan_file import MissionFile, read_mission
 from mission.simulation import free_udp_port, sitl_settings
@@ -21,7 +21,8 @@ from sitl.pose import PoseBlock
 from sitl.server import SitlSettings, run
 from sitl.world import load_world
 
-LEG_M = 30.0
+_LEG_M, _LEG_S = 30.0, 19.0  # with its turn
+_MAX_LEGS = 96  # of the plan's 200 tasks
 _HEAD = """\
 version: 1
 name: long_flight
@@ -31,7 +32,7 @@ tasks:
   - {task: move_until}
   - {task: align, turn: right}
 """
-_LEG = f"  - {{task: follow_lines, distance_m: {LEG_M:g}}}\n  - {{task: rotate, angle_deg: 180}}\n"
+_LEG = f"  - {{task: follow_lines, distance_m: {_LEG_M:g}}}\n  - {{task: rotate, angle_deg: 180}}\n"
 _TAIL = "  - {task: return}\nvehicle: {battery_wh: 10000}\n"
 
 
@@ -45,15 +46,11 @@ class EndlessBattery(Battery):
 
 
 def write_mission(folder: Path, flight_s: float) -> MissionFile:
-    """A mission out and back along the line again and again, of about `flight_s` [s]; the plan's 200 tasks at most."""
+    """A mission out and back along the line again and again, for about `flight_s` [s]; half an hour at most."""
     path = folder / "long_flight.yaml"
-    n_legs = 2
-    while True:
-        path.write_text(_HEAD + _LEG * n_legs + _TAIL, encoding="utf-8")
-        mission = read_mission(path)
-        if total(mission.plan).duration_s >= flight_s or len(mission.plan.tasks) > 190:
-            return mission
-        n_legs += 2
+    n_legs = min(_MAX_LEGS, 2 * math.ceil(flight_s / _LEG_S / 2))
+    path.write_text(_HEAD + _LEG * n_legs + _TAIL, encoding="utf-8")
+    return read_mission(path)
 
 
 @contextlib.contextmanager
