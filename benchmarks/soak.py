@@ -146,7 +146,7 @@ def soak_text(samples: list[Sample], outcome: FlightOutcome, log_mb: float) -> s
             for sample in samples[::every]]  # fmt: skip
     slopes = ", ".join(f"{COLUMNS[name]} {slope_per_hour(samples, name):+.1f}" for name in MOST_PER_HOUR)
     return (
-        f"`python -m benchmarks.soak` regenerates this section: one flight over MAVLink at 1x, with MAVSDK, guard, "
+        f"`make bench-soak` regenerates this section: one flight over MAVLink at 1x, with MAVSDK, guard, "
         f"recorder, journal and a vision worker on drawn 640 x 480 frames at {FRAMES_HZ:g} Hz, looked at every "
         f"{PERIOD_S:g} s. It {outcome.ended.result} after {samples[-1].at_s / 60:.1f} min; log {log_mb:.0f} MB.\n\n"
         f"**{'Nothing grows' if not grown else 'Grown: ' + '; '.join(grown)}.** "
