@@ -5,6 +5,7 @@ python -m tests.link_fuzz.pilot_program MISSION PORT SPEED EPOCH_NS
 
 import asyncio
 import functools
+import gc
 import json
 import sys
 from pathlib import Path
@@ -49,7 +50,7 @@ def main(path: Path, port: int, clock: ScaledClock) -> None:
     def on_progress(progress: Progress) -> None:
         if progress.stage not in stages[-1:]:
             stages.append(progress.stage)
-            say(stage=progress.stage, n_streams=count_streams())
+            say(stage=progress.stage, n_streams=count_streams(), n_frozen=gc.get_freeze_count())
 
     async def flight() -> object:
         # What asyncio would write to nobody: an exception in a callback, or in a task whose result nobody took.

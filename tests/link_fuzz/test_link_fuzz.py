@@ -58,6 +58,12 @@ def test_nothing_of_ours_falls_over(flights: dict[str, Ended], name: str) -> Non
 
 
 @pytest.mark.parametrize("name", ["strangers", "vehicle", "steering"])
+def test_in_flight_no_garbage_collection_looks_at_all_that_was_loaded(flights: dict[str, Ended], name: str) -> None:
+    n_frozen = [words["n_frozen"] for words in flights[name].said if words.get("stage", "")[:1].isdigit()]
+    assert min(n_frozen) > 10_000
+
+
+@pytest.mark.parametrize("name", ["strangers", "vehicle", "steering"])
 def test_the_mission_ends_as_declared(flights: dict[str, Ended], name: str) -> None:
     outcome = flights[name].outcome
     hazard = outcome["reason"].partition(":")[0].replace(" ", "_")
