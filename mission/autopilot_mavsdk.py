@@ -316,7 +316,10 @@ class MavsdkAutopilot:
     async def _pump(self, stream: AsyncIterator[Any], take: Callable[[Any], None]) -> None:
         try:
             async for item in stream:
-                take(item)
+                try:
+                    take(item)
+                except Exception as error:  # one message that cannot be read must not end its stream
+                    self._on_log(f"{type(error).__name__} in a message: {error}")
         finally:
             # A stream that has ended tells an old truth for ever: without one of them the link is as good as lost.
             self._is_deaf = True

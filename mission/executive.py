@@ -221,16 +221,17 @@ class Executive:
         loop = asyncio.get_running_loop()
         period_ns = round(NS_PER_S / CONTROL_RATE_HZ)
         last_ns = self._clock.now_ns()
-        deadline_ns = last_ns
+        due_ns = deadline_ns = last_ns
         while not self._machine.is_over:
             now_ns = self._clock.now_ns()
             self.tick_s = loop.time()
-            self._situation.pace.tick(self._clock.wall_s((now_ns - deadline_ns) / NS_PER_S))
+            self._situation.pace.tick(self._clock.wall_s((now_ns - due_ns) / NS_PER_S))
             # A late tick must not become one large step: what was missed is lost, and the vehicle waits.
             dt_s = min((now_ns - last_ns) / NS_PER_S, 2.0 / CONTROL_RATE_HZ)
             last_ns = now_ns
             await self._tick(now_ns, dt_s)
-            deadline_ns = max(deadline_ns + period_ns, self._clock.now_ns())
+            due_ns = deadline_ns + period_ns
+            deadline_ns = max(due_ns, self._clock.now_ns())  # what was missed is not made up for
             await asyncio.sleep(self._clock.wall_s((deadline_ns - self._clock.now_ns()) / NS_PER_S))
 
     def _is_as_it_was(self) -> bool:

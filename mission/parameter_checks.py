@@ -42,7 +42,6 @@ _LOSS_ACTIONS = {
     7: "Disarm, which stops the motors",
 }
 _RETURN, _HOLD = 3, 5
-_STATION_RETURN = 2
 
 
 @dataclass(frozen=True, slots=True)
@@ -196,19 +195,18 @@ def _low_battery_action(parameters: Parameters, plan: MissionPlan, extent: Exten
 
 
 def _station_loss_action(parameters: Parameters, plan: MissionPlan, extent: Extent) -> Check:
-    """Outside offboard nobody misses our setpoints; our heartbeat is what is left to miss."""
+    """Our heartbeat ends with our program, also while a pilot flies who has taken over: nothing may come of that."""
     name = "station_loss_action"
     action = parameters.get("NAV_DLL_ACT")
     if action is None:
         return _unknown(name, "NAV_DLL_ACT")
-    if round(action) == _STATION_RETURN:
-        return passed(name, "when our heartbeat stops the autopilot returns")
-    words = {
-        0: "without our heartbeat the autopilot hovers where it is until the battery is low",
-        1: "without our heartbeat the autopilot hovers where it is until the battery is low",
-        3: "without our heartbeat the autopilot lands where it is, that may be on the line",
-    }.get(round(action), "without our heartbeat the autopilot stops the motors")
-    return warning(name, f"NAV_DLL_ACT is {action:g}: {words}; set it to {_STATION_RETURN} (return)")
+    if round(action) == 0:
+        return passed(name, "nothing happens when our heartbeat ends")
+    return warning(
+        name,
+        f"NAV_DLL_ACT is {action:g}: when this program ends after a takeover, the autopilot may take the vehicle from "
+        "its pilot; keep a ground station connected, or set it to 0",
+    )
 
 
 _CHECKS: tuple[Callable[[Parameters, MissionPlan, Extent], Check], ...] = (

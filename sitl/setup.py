@@ -9,7 +9,6 @@ from sitl.parameters import DEFAULTS
 _WANTED: dict[str, float | int] = {
     "COM_OBL_RC_ACT": 3,  # setpoints stop: return
     "COM_RC_OVERRIDE": 3,  # the sticks take over in automatic modes and in offboard
-    "NAV_DLL_ACT": 2,  # the companion's heartbeat stops: return
     "RTL_RETURN_ALT": 30.0,  # above the line, and below a mission's fence
 }
 SETUP = {name: value for name, value in _WANTED.items() if name in DEFAULTS}

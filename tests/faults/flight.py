@@ -36,6 +36,7 @@ _AFTER_S = {"takeoff": 5.0, "return": 4.0, "land": 4.0}
 _AFTERWARDS_S = 150.0
 _SAY_FOR_S = 1.2  # a takeover shows with the next heartbeat
 _STEP_S = 0.01
+_LOW_BATTERY = 0.06
 
 
 @dataclass
@@ -81,6 +82,16 @@ class Watchdog:
         if self._fault.is_takeover and autopilot.commands != self._commands and not autopilot.faults:
             self._break(f"fought the pilot: {autopilot.commands[len(self._commands) :]}")
 
+    def go_on_alone(self, limit_s: float) -> None:
+        """Nobody sends anything any more; until the vehicle is down, or `limit_s` have passed."""
+        assert self._autopilot is not None
+        sim = self._autopilot.sim
+        for _ in range(round(limit_s / _STEP_S)):
+            if not sim.is_armed and sim.vehicle.is_on_ground:
+                return
+            sim.step(_STEP_S)
+            self.look()
+
     def _break(self, words: str) -> None:
         if words not in self.broken:
             self.broken.append(words)
@@ -103,17 +114,17 @@ def fly_case(fault_name: str, task: str) -> Flight:
     mode_at_end, was_in_failsafe = sim.mode, sim.failsafe is not None
     # The executive is gone, and so is its stream.
     flown.autopilot._setpoint = None
-    for _ in range(round(_AFTERWARDS_S / _STEP_S)):
-        if not sim.is_armed and sim.vehicle.is_on_ground:
-            break
-        sim.step(_STEP_S)
-        watchdog.look()
-    end = _end_of(flown, fault, mode_at_end, was_in_failsafe=was_in_failsafe)
+    watchdog.go_on_alone(_AFTERWARDS_S)
+    is_hovering = sim.is_armed and sim.mode is Mode.LOITER and not fault.is_takeover
+    if is_hovering:
+        sim.battery.remaining = _LOW_BATTERY
+        watchdog.go_on_alone(_AFTERWARDS_S)
+    end = _end_of(flown, fault, mode_at_end, was_in_failsafe=was_in_failsafe, is_hovering=is_hovering)
     tasks = [item.task for item in flown.of(TaskStarted)]
     return Flight(end, [*flown.story, f"then {sim.mode.title}, after {tasks[-1]}"], watchdog.broken)
 
 
-def _end_of(flown: Flown, fault: Fault, mode_at_end: Mode, *, was_in_failsafe: bool) -> End:
+def _end_of(flown: Flown, fault: Fault, mode_at_end: Mode, *, was_in_failsafe: bool, is_hovering: bool) -> End:
     sim, result = flown.autopilot.sim, flown.ended.result
     is_down = not sim.is_armed and sim.vehicle.is_on_ground
     if fault.is_takeover and result is not Result.COMPLETED:
@@ -125,5 +136,5 @@ def _end_of(flown: Flown, fault: Fault, mode_at_end: Mode, *, was_in_failsafe: b
     if math.hypot(n, e) > HOME_M:
         return End.ELSEWHERE
     if result is not Result.COMPLETED:
-        return End.HOME
+        return End.HOVERS if is_hovering else End.HOME
     return End.PAUSED if any("-> hold" in line or "-> search" in line for line in flown.story) else End.COMPLETED

@@ -14,6 +14,8 @@ class End(enum.StrEnum):
     """The mission ends early: landed at the take-off point, disarmed."""
     ELSEWHERE = "E"
     """Landed somewhere else, disarmed: the autopilot's own doing."""
+    HOVERS = "o"
+    """It hovers in its own mode until the low battery brings it home."""
     PILOT = "P"
     """The pilot has it, and nothing more is sent."""
     LOST = "X"
@@ -42,8 +44,8 @@ EXPECTED = {
     "pilot_land": "P P P P P P P P P c c",
     "pilot_sticks": "P P P P P P P P P P P",
     "kill_switch": "P P P P P P P P P P P",
-    "link_lost": "H H H H H H H H H H H",
-    "uplink_lost": "H H H H H H H H H H H",
+    "link_lost": "o H H H H H H H H H H",
+    "uplink_lost": "o H H H H H H H H H H",
     "telemetry_frozen": "H H H H H H H H H H H",
     "second_controller": "H H H H H H H H H c c",
     "setpoints_unanswered": "H H H H H H H H H c c",

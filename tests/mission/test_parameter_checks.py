@@ -23,7 +23,7 @@ GOOD = {
     "GF_MAX_HOR_DIST": 0.0,
     "GF_MAX_VER_DIST": 0.0,
     "COM_LOW_BAT_ACT": 3.0,
-    "NAV_DLL_ACT": 2.0,
+    "NAV_DLL_ACT": 0.0,
 }
 
 # Which check, what is other than good (None: the autopilot does not tell it), the result, words of the reason.
@@ -69,10 +69,8 @@ TABLE = [
     ("low_battery_action", {"COM_LOW_BAT_ACT": 0}, WARNING, "only warns"),
     ("low_battery_action", {"COM_LOW_BAT_ACT": 2}, WARNING, "lands"),
     ("low_battery_action", {"COM_LOW_BAT_ACT": None}, OK, "not checked"),
-    ("station_loss_action", {"NAV_DLL_ACT": 0}, WARNING, "hovers where it is"),
-    ("station_loss_action", {"NAV_DLL_ACT": 2}, OK, "returns"),
-    ("station_loss_action", {"NAV_DLL_ACT": 3}, WARNING, "on the line"),
-    ("station_loss_action", {"NAV_DLL_ACT": 5}, WARNING, "stops the motors"),
+    ("station_loss_action", {"NAV_DLL_ACT": 0}, OK, "nothing happens"),
+    ("station_loss_action", {"NAV_DLL_ACT": 2}, WARNING, "take the vehicle from its pilot"),
     ("station_loss_action", {"NAV_DLL_ACT": None}, OK, "not checked"),
 ]  # fmt: skip
 

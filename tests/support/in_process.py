@@ -53,8 +53,10 @@ class InProcessAutopilot:
         wind_m_s: float = 0.0,
         seed: int = 1,
         sim: SimAutopilot | None = None,
+        step_s: float = _STEP_S,
     ) -> None:
         self._clock = clock
+        self._step_s = step_s
         self.sim = sim or SimAutopilot(
             Vehicle(yaw_rad=start_yaw_rad), Wind(wind_m_s, seed), seed=seed, parameters=Parameters(SETUP)
         )
@@ -83,8 +85,8 @@ class InProcessAutopilot:
     def catch_up(self) -> None:
         """Step the vehicle to now."""
         now_s = self._clock.now_ns() / 1e9
-        while self.sim.boot_s + _STEP_S <= now_s:
-            self.sim.step(_STEP_S)
+        while self.sim.boot_s + self._step_s <= now_s:
+            self.sim.step(self._step_s)
             self._repeat_setpoint()
             for act in self.after_step:
                 act()
