@@ -45,7 +45,7 @@ EXPECTED = {
     "pilot_sticks": "P P P P P P P P P P P",
     "kill_switch": "P P P P P P P P P P P",
     "link_lost": "o H H H H H H H H H H",
-    "uplink_lost": "o H H H H H H H H H H",
+    "uplink_lost": "o H H H H H H H H c c",
     "telemetry_frozen": "H H H H H H H H H H H",
     "second_controller": "H H H H H H H H H c c",
     "setpoints_unanswered": "H H H H H H H H H c c",
