@@ -23,6 +23,7 @@ from mission.build import (
     setpoint_limits,
 )
 from mission.checks import Check
+from mission.departure import Departure, depart
 from mission.detours import Detour, detour_task
 from mission.eyes import Eyes
 from mission.hazards import TaskView, find_hazards
@@ -31,15 +32,14 @@ from mission.limits import floor_m
 from mission.logbook import Logbook
 from mission.plan import MissionPlan
 from mission.preflight import wait_until_ready
-from mission.preflight_checks import is_handed_over, not_at_rest
 from mission.records import Event, MissionEnded, PreflightCheck, Result, Severity, TaskEnded, TaskStarted
 from mission.reporting import FlightLog, Progress
-from mission.resumption import Resumption, plan_to_reckon
+from mission.resumption import CannotResumeError, Resumption, plan_to_reckon
 from mission.safety import PAUSES, Hazard, Reaction, decide, keep_going_down, way_down
 from mission.situation import Computer, Situation, Troubles
 from mission.tasks.go_down import GoDownTask
 from mission.tasks.rejoin import RejoinTask
-from mission.tasks.task import Command, FlightMemory, Observation, Task
+from mission.tasks.task import Command, Observation, Task
 
 CONTROL_RATE_HZ = 20.0
 PAUSE_BEFORE_GOING_DOWN_S = 2.0
@@ -107,8 +107,7 @@ class Executive:
         self._helm = Helm(crew.autopilot, crew.log, clock, setpoint_limits(plan))
         self._task: Task | None = None
         self._detour: Detour | None = None
-        self._rejoin_at = Setpoint(0.0, 0.0, 0.0, 0.0)
-        self._begins_flying = False
+        self._departure: Departure | None = None
         self._stand = Setpoint(0.0, 0.0, 0.0, 0.0)
         self._task_started_ns = 0
         self._may_be_over_line = False
@@ -182,38 +181,33 @@ class Executive:
 
     async def _begin(self, state: VehicleState, vehicle_uid: str) -> str | None:
         """Know where the flight begins; returns in a sentence why it must not."""
-        here = Setpoint(state.north_m, state.east_m, state.down_m, state.yaw_rad)
-        origin = await self._autopilot.read_origin()
-        if self._resumption is not None:
-            if origin is None:
-                return "the autopilot does not tell where on Earth it is, so that the mission cannot be resumed"
-            self._begins_flying = is_handed_over(state)
-            if self._begins_flying:
-                self._resumption = self._resumption.in_the_air(self._plan)
-                self._helm.modes.begin(state.mode)
-            is_flying = self._begins_flying
-            refusal = self._resumption.refusal(self._plan, state, vehicle_uid, origin, is_flying=is_flying)
-            if refusal is not None:
-                return refusal
-            memory, self._rejoin_at = self._resumption.locate(origin, here, is_flying=is_flying)
-        else:
-            theta_0_rad = self._guidance.theta_0_rad
-            memory = FlightMemory(here, state.yaw_rad if theta_0_rad is None else theta_0_rad)
-        self._situation.begin(memory)
-        self._helm.start, self._helm.reference = memory.start, here
-        self._stand = here
-        await self._crew.logbook.begin(origin, memory, vehicle_uid, self._resumption)
+        try:
+            departure = await depart(
+                self._autopilot, self._plan, self._guidance.theta_0_rad, state, vehicle_uid, self._resumption
+            )
+        except CannotResumeError as error:
+            return str(error)
+        if departure.is_flying:
+            self._helm.modes.begin(state.mode)
+        self._departure, self._resumption = departure, departure.resumption
+        self._situation.begin(departure.memory)
+        self._helm.start, self._helm.reference = departure.memory.start, departure.here
+        self._stand = departure.here
+        await self._crew.logbook.begin(departure.origin, departure.memory, vehicle_uid, departure.resumption)
         return None
 
     # -- the control loop ----------------------------------------------------------------------------------------
 
     async def _fly(self) -> None:
-        if self._resumption is not None and self._begins_flying:
-            await self._rejoin(self._resumption)
+        departure = self._departure
+        if departure is None:
+            raise RuntimeError("a flight without a beginning")
+        if departure.resumption is not None and departure.is_flying:
+            await self._rejoin(departure.resumption, departure.rejoin_at)
         else:
             await self._machine.trigger_named("advance")
             self._start_task()
-        if not self._is_as_it_was():
+        if not departure.is_as_it_was(self._autopilot.state):
             # Between the last look before the flight and now the disk was waited for: somebody was quicker.
             self._end = (Result.TAKEN_OVER, "takeover: somebody took the vehicle before the first command")
             await self._machine.trigger_named("give_up")
@@ -233,13 +227,6 @@ class Executive:
             due_ns = deadline_ns + period_ns
             deadline_ns = max(due_ns, self._clock.now_ns())  # what was missed is not made up for
             await asyncio.sleep(self._clock.wall_s((deadline_ns - self._clock.now_ns()) / NS_PER_S))
-
-    def _is_as_it_was(self) -> bool:
-        """Whether the vehicle still stands at rest, or still hovers as it was handed over."""
-        state = self._autopilot.state
-        if state is None:
-            return False
-        return is_handed_over(state) if self._begins_flying else not_at_rest(state) is None
 
     async def _tick(self, now_ns: int, dt_s: float) -> None:
         state = self._autopilot.state
@@ -322,8 +309,9 @@ class Executive:
         if index is None:  # going down has ended: the mission ends as the reaction said
             await self._machine.trigger_named(_TRIGGERS[self._end[0]])
             return
-        if index == 0 and self._resumption is not None and self._resumption.index > 0:
-            await self._rejoin(self._resumption)
+        departure = self._departure
+        if index == 0 and departure is not None and departure.resumption is not None and departure.resumption.index > 0:
+            await self._rejoin(departure.resumption, departure.rejoin_at)
             return
         await self._machine.trigger_named("advance")
         if self._machine.is_over:
@@ -332,7 +320,7 @@ class Executive:
 
     # -- detours: what pauses a task ---------------------------------------------------------------------------------
 
-    async def _rejoin(self, resumption: Resumption) -> None:
+    async def _rejoin(self, resumption: Resumption, rejoin_at: Setpoint) -> None:
         """Fly to where the mission was interrupted; from there the task is taken up."""
         await self._machine.trigger_named("rejoin", towards=resumption.index)
         now_ns = self._clock.now_ns()
@@ -341,7 +329,7 @@ class Executive:
         self._task_started_ns = now_ns
         self._task = build_task(self._plan.tasks[resumption.index], self._guidance, self._situation.memory)
         transit_down_m = self._situation.memory.start.down_m - resumption.transit_height_m
-        rejoin = RejoinTask(self._rejoin_at, transit_down_m, self._guidance)
+        rejoin = RejoinTask(rejoin_at, transit_down_m, self._guidance)
         self._detour = Detour(rejoin, None, Reaction.CONTINUE, now_ns)
 
     async def _pause(self, hazard: Hazard, reaction: Reaction, words: str) -> None:
@@ -453,7 +441,7 @@ class Executive:
         self._situation.troubles = Troubles()
         self._detour = None
         self._task_started_ns = self._clock.now_ns()
-        if not (self._helm.was_told_to_arm or self._begins_flying):
+        if not (self._helm.was_told_to_arm or (self._departure is not None and self._departure.is_flying)):
             await self._machine.trigger_named(_TRIGGERS[self._end[0]])
             return
         task, memory = self._task, self._situation.memory

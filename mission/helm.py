@@ -8,7 +8,7 @@ from mission.autopilot import Autopilot, AutopilotError, FlightMode, NoAnswerErr
 from mission.guidance import leash
 from mission.limits import LOWEST_M, SetpointLimits, unsafe
 from mission.mode_watch import ModeWatch
-from mission.preflight import not_at_rest
+from mission.preflight_checks import not_at_rest
 from mission.reporting import FlightLog
 from mission.tasks.task import Command, Step
 from mission.watchers import TargetWatch

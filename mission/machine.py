@@ -82,11 +82,6 @@ class FlightMachine:
         return self._detour_index if self.state in DETOURS else None
 
     @property
-    def is_detour(self) -> bool:
-        """Whether the task is paused, or not yet reached again."""
-        return self.state in DETOURS
-
-    @property
     def is_over(self) -> bool:
         """Whether the flight has ended."""
         return self.state in END_STATES

@@ -17,8 +17,6 @@ from mission.preflight_checks import Facts, check_all, not_at_rest
 from mission.records import CheckResult
 from vision.records import VisionReport
 
-__all__ = ["not_at_rest", "wait_until_ready"]
-
 _POLL_S = 0.2
 _FINAL_AFTER_S = 1.0
 """A failure that waiting does not mend must have stood so long [s, wall]: first telemetry may be half of the truth."""

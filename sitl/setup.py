@@ -4,12 +4,9 @@ A real vehicle needs the same, and pre-flight checks ask for it: with PX4's defa
 vehicle without a pilot's sticks sink where it is.
 """
 
-from sitl.parameters import DEFAULTS
-
-_WANTED: dict[str, float | int] = {
+SETUP: dict[str, float | int] = {
     "COM_OBL_RC_ACT": 3,  # setpoints stop: return
     "COM_RC_OVERRIDE": 3,  # the sticks take over in automatic modes and in offboard
     "RTL_RETURN_ALT": 30.0,  # above the line, and below a mission's fence
 }
-SETUP = {name: value for name, value in _WANTED.items() if name in DEFAULTS}
-"""Parameter values by name; only such as the model has."""
+"""Parameter values by name."""

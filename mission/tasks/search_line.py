@@ -26,9 +26,9 @@ class SearchLineTask:
     """Done when the line was seen in n frames in a row and the vehicle is back at its height; failed when it was not.
 
     `way_back` are the places of the flown path, from here to where the line was last seen, and `climb_m` is what the
-    fence allows of the settings' own. A wider view (from higher up)
-    and other headings cost seconds; going back costs the way, so it comes last. A search that has found the line comes
-    down again; should it lose the line meanwhile, it goes on.
+    fence allows of the settings' own. A wider view (from higher up) and other headings cost seconds; going back costs
+    the way, so it comes last. A search that has found the line comes down again; should it lose the line meanwhile, it
+    goes on.
     """
 
     needs_line = False

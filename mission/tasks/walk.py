@@ -7,7 +7,7 @@ from mission.autopilot import Setpoint
 from mission.guidance import GuidanceSettings, step_level_towards, step_vertical, wrap_angle_rad
 from mission.tasks.task import Observation, is_there
 
-_YAW_REACHED_RAD = 0.05
+_YAW_REACHED_RAD = 0.2
 
 
 class Walk:
@@ -31,7 +31,7 @@ class Walk:
             return reference
         setpoint = step_towards(reference, self._waypoints[0], self._guidance, seen.dt_s)
         yaw_error_rad = abs(wrap_angle_rad(setpoint.yaw_rad - seen.state.yaw_rad))
-        is_here = is_there(seen.state, setpoint, self._guidance.arrival_m) and yaw_error_rad < 4 * _YAW_REACHED_RAD
+        is_here = is_there(seen.state, setpoint, self._guidance.arrival_m) and yaw_error_rad < _YAW_REACHED_RAD
         if setpoint == self._waypoints[0] and is_here:
             self._waypoints.pop(0)
         return setpoint
