@@ -324,6 +324,8 @@ class Executive:
         """Fly to where the mission was interrupted; from there the task is taken up."""
         await self._machine.trigger_named("rejoin", towards=resumption.index)
         now_ns = self._clock.now_ns()
+        words = f"flying to where task {resumption.index + 1} was interrupted"
+        self._log.record(Event(now_ns, "rejoining", Severity.INFO, words))
         self._may_be_over_line = True
         self._set_floor(resumption.height_m)
         self._task_started_ns = now_ns

@@ -185,7 +185,7 @@ def summarise(flight: Flight) -> FlightReport:
         if not yaw_error_rad.size
         else YawSummary(*(float(np.degrees(_percentile(yaw_error_rad, share))) for share in (50, 95))),
         vision=_vision(flight),
-        setpoints=_setpoints(flight, [_span_window(span, flight.end_ns) for span in spans]),
+        setpoints=_setpoints(flight, spans),
         landing=_landing(flight),
         events=tuple(
             EventSummary(since_start_s(event.t_ns), event.name, str(event.severity), event.message, event.reaction)
@@ -268,7 +268,11 @@ def _vision(flight: Flight) -> VisionSummary:
     )
 
 
-def _setpoints(flight: Flight, windows: list[tuple[int, int]]) -> SetpointSummary:
+def _setpoints(flight: Flight, spans: tuple[TaskSpan, ...]) -> SetpointSummary:
+    """Up to the start of the next task each: a resumed mission flies to where it was interrupted in between."""
+    windows = [_span_window(span, flight.end_ns) for span in spans]
+    ends_ns = [start_ns for start_ns, _ in windows[1:]] + [end_ns for _, end_ns in windows[-1:]]
+    windows = [(start_ns, end_ns) for (start_ns, _), end_ns in zip(windows, ends_ns, strict=True)]
     gaps_s = offboard_gaps_s(np.array([setpoint.t_ns for setpoint in flight.setpoints], dtype=np.int64), windows)
     if not gaps_s.size:
         return SetpointSummary(None, None)
