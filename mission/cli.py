@@ -172,7 +172,7 @@ def resume(
     as_json: JsonOption = False,
 ) -> None:
     """Take an interrupted mission up again, from its journal: after a crash, a takeover, or a change of battery."""
-    from mission.journal import DRY_RUN, JournalError, newest_journal, read_journal
+    from mission.journal import DRY_RUN, JournalError, check_ended, newest_journal, read_journal
     from mission.resumption import CannotResumeError, explain_resumption, find_resumption
 
     try:
@@ -187,6 +187,10 @@ def resume(
         typer.echo(line, err=not explain)
     if explain:
         return
+    try:
+        check_ended(path)
+    except JournalError as error:
+        _fail(str(error), EXIT_BAD_INPUT)
     if begin.camera == DRY_RUN and camera is None and connection is None:
         _fail("That was a dry-run: its vehicle is gone. To try it, fly with lineflight sitl and run.", EXIT_BAD_INPUT)
     _run(mission_file, connection or begin.connection, camera or begin.camera, log, as_json, (remaining, resumption))

@@ -8,6 +8,7 @@ line says how far the task has come. A line that a crash cut off is ignored.
 import asyncio
 import contextlib
 import errno
+import fcntl
 import math
 import os
 from collections.abc import Awaitable, Callable
@@ -170,6 +171,7 @@ class DiskJournal:
     def _put(self, line: bytes) -> None:
         if self._file is None:
             self._file = os.open(self.path, os.O_WRONLY | os.O_CREAT | os.O_EXCL | os.O_APPEND, 0o644)
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)  # until this program ends, however it ends
             _sync_folder(self.path.parent)
         # A line that did not go on a full disk whole must not spoil the next one.
         rest = b"\n" + line if self._is_torn else line
@@ -217,6 +219,17 @@ def read_journal(path: Path) -> tuple[Begin, list[Transition | Standing]]:
             f"{path} is not a journal that says which mission was flown; name a *{SUFFIX} of lineflight run."
         )
     return begin, others
+
+
+def check_ended(path: Path) -> None:
+    """See that the program which wrote a journal has ended: two must not fly one vehicle. Raises JournalError."""
+    try:
+        with path.open("rb") as file:
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise JournalError(f"The flight of {path} is still going on; end its program before you resume it.") from None
+    except OSError as error:
+        raise JournalError(f"The journal {path} cannot be read ({error.strerror}).") from None
 
 
 def newest_journal(folder: Path) -> Path:

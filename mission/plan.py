@@ -284,12 +284,21 @@ class SafetyPlan(_Section):
     reactions: Reactions = Reactions()
 
     @model_validator(mode="after")
+    def _fence_has_room(self) -> Self:
+        least_m = self.fence.min_altitude_m
+        if least_m is not None and least_m >= self.max_altitude_m:
+            raise PydanticCustomError(
+                "fence_room", "fence.min_altitude_m below max_altitude_m = {high}", {"high": f"{self.max_altitude_m:g}"}
+            )
+        return self
+
+    @model_validator(mode="after")
     def _critical_is_below_low(self) -> Self:
         if self.battery_critical_percent >= self.battery_low_percent:
             raise PydanticCustomError(
                 "battery_order",
-                "battery_critical_percent below battery_low_percent = {low:g}",
-                {"low": self.battery_low_percent},
+                "battery_critical_percent below battery_low_percent = {low}",
+                {"low": f"{self.battery_low_percent:g}"},
             )
         return self
 

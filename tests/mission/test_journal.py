@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from mission.journal import Begin, DiskJournal, Transition, read_journal
+from mission.journal import Begin, DiskJournal, JournalError, Transition, check_ended, read_journal
 
 BEGIN = Begin(
     unix_s=1.0,
@@ -101,6 +101,18 @@ def test_before_the_flight_begins_there_is_no_file(tmp_path: Path) -> None:
 
     asyncio.run(write())
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_flight_that_goes_on_cannot_be_resumed(tmp_path: Path) -> None:
+    async def fly() -> None:
+        journal = DiskJournal(tmp_path / "a.journal", at_once)
+        await journal.write(BEGIN)
+        with pytest.raises(JournalError, match="still going on"):
+            check_ended(tmp_path / "a.journal")
+        await journal.close()
+
+    asyncio.run(fly())
+    check_ended(tmp_path / "a.journal")
 
 
 def test_a_name_that_is_no_text_is_a_failure_and_no_exception(tmp_path: Path) -> None:

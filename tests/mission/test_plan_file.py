@@ -180,3 +180,18 @@ def test_a_folder_and_a_missing_file_are_refused(tmp_path: Path) -> None:
         read_mission(tmp_path)
     with pytest.raises(MissionFileError, match="no such file"):
         read_mission(tmp_path / "none.yaml")
+
+
+@pytest.mark.parametrize(
+    ("safety", "allowed"),
+    [
+        ("{battery_low_percent: 20, battery_critical_percent: 50}", "below battery_low_percent = 20"),
+        ("{max_altitude_m: 40.5, fence: {min_altitude_m: 100}}", "fence.min_altitude_m below max_altitude_m = 40.5"),
+    ],
+)  # fmt: skip
+def test_limits_that_contradict_each_other_are_told_with_their_values(
+    safety: str, allowed: str, tmp_path: Path
+) -> None:
+    text = f"version: 1\nname: x\ntasks: [{{task: takeoff}}, {{task: land}}]\nsafety: {safety}\n"
+    (line,) = problems_of(tmp_path, text)
+    assert line.endswith(allowed)
