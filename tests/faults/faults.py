@@ -141,7 +141,7 @@ def _stop_with(fault: str) -> Callable[[Cockpit], None]:
 
 def _replace_task(task: Callable[[], object]) -> Callable[[Cockpit], None]:
     def break_it(cockpit: Cockpit) -> None:
-        cockpit.executive._task = task()  # type: ignore[assignment]
+        cockpit.executive._flow.task = task()  # type: ignore[assignment]
 
     return break_it
 
@@ -231,7 +231,7 @@ def _block_loop(blocked_s: float, period_s: float, for_s: float) -> Callable[[Co
 
 
 def _age_task(cockpit: Cockpit) -> None:
-    cockpit.executive._task_started_ns -= 3_600_000_000_000
+    cockpit.executive._flow._task_started_ns -= 3_600_000_000_000
 
 
 def _stop(cockpit: Cockpit) -> None:

@@ -399,7 +399,7 @@ class BrokenTask:
 
 def test_a_bug_in_a_task_brings_the_vehicle_down() -> None:
     def break_it(cockpit: Cockpit) -> None:
-        cockpit.executive._task = BrokenTask()
+        cockpit.executive._flow.task = BrokenTask()
 
     flown = fly(ALL_TASKS_PLAN, in_task="hold", do=break_it)
     assert flown.ended.result is Result.FAILED

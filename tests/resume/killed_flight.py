@@ -51,10 +51,10 @@ def kill_and_resume(folder: Path, kill_s: float, away_s: float) -> Aftermath:
         journal = DiskJournal(folder / "first.journal", disk.run)
         first = bare_executive(ALL_TASKS_PLAN, autopilot, clock, log=first_log, journal=journal)
         reached: list[str] = []
-        first._machine._after = reached.append  # besides what the executive does with it
+        first._flow.machine._after = reached.append  # besides what the executive does with it
         running = asyncio.create_task(first.run())
         await asyncio.sleep(kill_s)
-        killed_in = first._machine.state
+        killed_in = first._flow.machine.state
         disk.is_alive = False
         autopilot.die()
         running.cancel()
