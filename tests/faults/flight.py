@@ -34,6 +34,7 @@ HOME_M = 3.0
 _PILOTS_MODES = (Mode.LOITER, Mode.RTL, Mode.LAND, Mode.POSCTL)
 _AFTER_S = {"takeoff": 5.0, "return": 4.0, "land": 4.0}
 _AFTERWARDS_S = 150.0
+_PILOTS_S = 15.0
 _SAY_FOR_S = 1.2  # a takeover shows with the next heartbeat
 _STEP_S = 0.01
 _LOW_BATTERY = 0.06
@@ -114,7 +115,8 @@ def fly_case(fault_name: str, task: str) -> Flight:
     mode_at_end, was_in_failsafe = sim.mode, sim.failsafe is not None
     # The executive is gone, and so is its stream.
     flown.autopilot._setpoint = None
-    watchdog.go_on_alone(_AFTERWARDS_S)
+    # A pilot's vehicle need not come down, and its failsafes would take it from nobody.
+    watchdog.go_on_alone(_PILOTS_S if fault.is_takeover else _AFTERWARDS_S)
     is_hovering = sim.is_armed and sim.mode is Mode.LOITER and not fault.is_takeover
     if is_hovering:
         sim.battery.remaining = _LOW_BATTERY

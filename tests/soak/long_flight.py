@@ -148,7 +148,7 @@ def fly_long(n_tasks: int, *, is_leaking: bool) -> tuple[str, list[Held]]:
         autopilot = InProcessAutopilot(clock, sim=sim, step_s=0.025)
         autopilot.after_step.append(lambda: setattr(sim.battery, "remaining", 1.0))
         camera = pinhole_intrinsics(plan.camera)
-        eyes = GeometricEyes(autopilot, clock, camera, LINE_POINT_NED_M, LINE_HEADING_RAD)
+        eyes = GeometricEyes(autopilot.true_pose, clock, camera, LINE_POINT_NED_M, LINE_HEADING_RAD)
         log = LeakingLog(on_task) if is_leaking else FlightLogWithoutMemory(on_task)
         crew = Crew(autopilot, eyes, camera, log, Logbook(NoJournal(), PAPERS), ComputerView)
         ended = await Executive(plan, crew, clock).run()
