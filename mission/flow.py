@@ -85,6 +85,11 @@ class Flow:
         return self.machine.state == m.GOING_DOWN
 
     @property
+    def is_on_its_way_down(self) -> bool:
+        """Whether a landing or a return is flown now, the mission's own or an early one."""
+        return isinstance(self.task, GoDownTask) and self.detour is None
+
+    @property
     def flown(self) -> Task | None:
         """The task that steers now: the mission's, or its detour's."""
         return self.task if self.detour is None else self.detour.task
@@ -240,20 +245,20 @@ class Flow:
             limit_s=limit_s,
             needs_line=needing is not None and needing.needs_line,
             needs_vision=needing is not None and needing.needs_vision,
-            is_going_down=isinstance(task, GoDownTask) and detour is None,
+            is_going_down=self.is_on_its_way_down,
             failure=self._situation.troubles.task_failure,
         )
 
     def note_refusal(self, words: str) -> None:
         """On the way down a refusal is noted, and the task asks again; before that it is a hazard."""
-        if isinstance(self.task, GoDownTask):
+        if self.is_on_its_way_down:
             self._log.record(Event(self._clock.now_ns(), Hazard.COMMAND_REFUSED, Severity.WARNING, words))
         else:
             self._situation.troubles.refusal = words
 
     def note_bug(self, words: str) -> None:
         """A bug on the way down is noted, and the way down goes on: who gave up there would leave it in the air."""
-        if not isinstance(self.task, GoDownTask):
+        if not self.is_on_its_way_down:
             self._situation.troubles.internal_error = words
         elif Hazard.INTERNAL_ERROR not in self._noted:
             self._noted.add(Hazard.INTERNAL_ERROR)
