@@ -21,7 +21,7 @@ from mission.build import (
     setpoint_limits,
 )
 from mission.checks import Check
-from mission.departure import Departure, depart
+from mission.departure import depart
 from mission.eyes import Eyes
 from mission.flow import Flow
 from mission.hazards import find_hazards
@@ -86,7 +86,6 @@ class Executive:
         self._flow = Flow(
             plan, crew.autopilot, self._helm, self._situation, crew.log, crew.logbook, clock, self._on_change
         )
-        self._departure: Departure | None = None
         self.progress = Progress(m.PREFLIGHT, None, None, None)
         self.tick_s: float | None = None
         """When the last control tick began, in the event loop's time [s]; None before the first."""
@@ -163,7 +162,7 @@ class Executive:
             return str(error)
         if departure.is_flying:
             self._helm.modes.begin(state.mode)
-        self._departure, self._resumption = departure, departure.resumption
+        self._flow.departure, self._resumption = departure, departure.resumption
         self._situation.begin(departure.memory)
         self._helm.start, self._helm.reference = departure.memory.start, departure.here
         self._flow.stand = departure.here
@@ -173,7 +172,7 @@ class Executive:
     # -- the control loop ----------------------------------------------------------------------------------------
 
     async def _fly(self) -> None:
-        departure = self._departure
+        departure = self._flow.departure
         if departure is None:
             raise RuntimeError("a flight without a beginning")
         await self._flow.begin(departure)

@@ -46,7 +46,8 @@ class Flow:
     """Where a flight stands. `task` is the mission's, `detour` what is flown instead of it for a while.
 
     `machine` holds the state, `end` how the flight ends (it counts once the machine is over), and `stand` where the
-    task is to be taken up again should the flight break off now. `on_change(state)` hears of each transition.
+    task is to be taken up again should the flight break off now. `departure` is set after pre-flight, before `begin`.
+    `on_change(state)` hears of each transition.
     """
 
     def __init__(
@@ -96,7 +97,6 @@ class Flow:
 
     async def begin(self, departure: Departure) -> None:
         """Begin with the first task, or on the way to where the mission was interrupted."""
-        self.departure = departure
         if departure.resumption is not None and departure.is_flying:
             await self.rejoin(departure.resumption, departure.rejoin_at)
         else:
