@@ -279,3 +279,30 @@ def test_the_newest_journal_passes_over_what_cannot_be_resumed(journal: Path, tm
 def test_a_flight_that_never_began_leaves_no_journal(tmp_path: Path) -> None:
     fly_in_stages(tmp_path, Stage(1.0))
     assert not (tmp_path / "0.journal").exists()
+
+
+def test_a_pilot_who_takes_over_while_the_journal_waits_for_its_disk_is_not_fought(tmp_path: Path) -> None:
+    async def slow(work: Callable[[], None]) -> None:
+        work()
+        await asyncio.sleep(0.9)
+
+    async def flight() -> tuple[MissionEnded, list[str], Mode]:
+        clock = VirtualClock()
+        link = InProcessAutopilot(clock, start_yaw_rad=START_YAW_RAD)
+        journal = DiskJournal(tmp_path / "slow.journal", slow)
+        program = bare_executive(ALL_TASKS_PLAN, link, clock, journal=journal)
+        running = asyncio.create_task(program.run())
+        await asyncio.sleep(45.0)
+        program.request_stop()
+        await asyncio.sleep(0.3)  # the transition is on its way to the disk
+        link.catch_up()
+        link.sim.set_mode(Mode.RTL)
+        link._heartbeat_s -= 1.0  # the next heartbeat comes at once
+        ended = await running
+        await journal.close()
+        return ended, link.commands, link.sim.mode
+
+    ended, commands, mode = run_virtually(flight())
+    assert ended.result is Result.TAKEN_OVER
+    assert commands[-1] == "offboard", "neither hold nor return was sent after the takeover"
+    assert mode is Mode.RTL
