@@ -13,9 +13,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.camera.camera import Frame, Intrinsics
-from sitl.lens import CameraMount, camera_pose
 from sitl.pose import Pose, PoseBlock
-from sitl.world import load_world
+from sitl.render.lens import CameraMount, camera_pose
+from sitl.world.file import load_world
 
 _SPARE_PX = 32  # the noise is that much larger than a frame, and is shown from elsewhere in each: no two are the same
 _NEAREST_M = 0.5

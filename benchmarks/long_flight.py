@@ -14,12 +14,12 @@ from benchmarks.line_camera import LineCamera
 from drivers.clock import ScaledClock
 from mission.flight import FlightSetup
 from mission.plan_file import MissionFile, read_mission
-from mission.simulation import free_udp_port, sitl_settings
+from mission.simulated.simulation import free_udp_port, sitl_settings
 from sitl import autopilot
 from sitl.battery import Battery
 from sitl.pose import PoseBlock
 from sitl.server import SitlSettings, run
-from sitl.world import load_world
+from sitl.world.file import load_world
 
 _LEG_M, _LEG_S = 30.0, 19.0  # with its turn
 _MAX_LEGS = 96  # of the plan's 200 tasks

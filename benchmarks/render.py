@@ -12,11 +12,11 @@ import time
 import cv2
 import numpy as np
 
-from sitl.coverage import add_strip
-from sitl.lens import pinhole
 from sitl.pose import Pose
-from sitl.render import Renderer
-from sitl.world import load_world
+from sitl.render.coverage import add_strip
+from sitl.render.lens import pinhole
+from sitl.render.renderer import Renderer
+from sitl.world.file import load_world
 
 VIEWS = {
     "on the ground, 0.1 m": (0.0, 0.0, 0.1, 20.0, 0.0),

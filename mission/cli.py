@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from mission.plan import MissionPlan
     from mission.plan_file import MissionFile
     from mission.resumption import Resumption
-    from mission.simulation import Simulation
+    from mission.simulated.simulation import Simulation
 
 EXIT_FAILED_FILE = 1
 EXIT_BAD_INPUT = 2
@@ -84,7 +84,7 @@ def dry_run(
     mission_file = _read_mission(mission)
     from drivers.clock import ScaledClock
     from mission.flight import FlightSetup
-    from mission.simulation import Simulation, WorldError, true_line, world_path_or_name
+    from mission.simulated.simulation import Simulation, WorldError, true_line, world_path_or_name
 
     clock = ScaledClock(speed, ScaledClock().now_ns())
     try:
@@ -210,7 +210,7 @@ def sitl(
     autopilot: Annotated[Literal["px4", "arducopter"], typer.Option(help="Whose MAVLink the vehicle speaks.")] = "px4",
 ) -> None:
     """Run only the simulated vehicle, until Ctrl-C; any MAVLink program can fly it."""
-    from mission.simulation import SETUP, WorldError, serve_until_stopped, world_path_or_name
+    from mission.simulated.simulation import SETUP, WorldError, serve_until_stopped, world_path_or_name
 
     setup = ", ".join(f"{name} {value:g}" for name, value in SETUP.items())
     typer.echo(f"Its parameters are PX4's defaults, but {setup}.", err=True)

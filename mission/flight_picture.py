@@ -10,7 +10,7 @@ from mission.log.picture import draw_summary, flight_view
 from mission.log.reader import read_flight
 from mission.log.summary import summarise
 from mission.log.track_map import MapBackground
-from mission.simulation import World, draw_map
+from mission.simulated.simulation import World, draw_map
 
 
 class PictureError(Exception):

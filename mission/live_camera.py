@@ -33,7 +33,7 @@ class LiveCamera:
             self.open_camera = functools.partial(open_camera, source, settings, self.clock)
 
     def _hang_on_telemetry(self, world: str, intrinsics: Intrinsics, rate_hz: float) -> None:
-        from mission.simulation import TelemetryCamera, WorldError, world_path_or_name
+        from mission.simulated.simulation import TelemetryCamera, WorldError, world_path_or_name
 
         try:
             camera = TelemetryCamera(world_path_or_name(world or None), self.clock, intrinsics, rate_hz)

@@ -7,11 +7,11 @@ from typing import Self
 from drivers.camera.camera import CameraError, Frame, Intrinsics
 from drivers.camera.mailbox import Mailbox
 from drivers.clock import NS_PER_S, ScaledClock
-from sitl.lens import CameraMount
 from sitl.pose import Pose, PoseBlock
-from sitl.render import Renderer
-from sitl.sensor import Optics
-from sitl.world import WorldError, load_world
+from sitl.render.lens import CameraMount
+from sitl.render.renderer import Renderer
+from sitl.render.sensor import Optics
+from sitl.world.file import WorldError, load_world
 
 _JOIN_S = 5.0
 

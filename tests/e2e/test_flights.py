@@ -10,7 +10,7 @@ import pytest
 
 from drivers.camera.calibration_file import write_calibration
 from drivers.camera.camera import Intrinsics
-from mission.simulation import free_udp_port
+from mission.simulated.simulation import free_udp_port
 from tests.support.command_line import ROOT, lineflight, lineflight_stopped
 
 pytestmark = pytest.mark.real_time

@@ -7,7 +7,7 @@ import pytest
 from pymavlink.dialects.v20 import all as dialect
 
 from mission.safety import Hazard
-from mission.simulation import free_udp_port
+from mission.simulated.simulation import free_udp_port
 from tests.link_fuzz.flight_through import Ended, fly_through
 from tests.link_fuzz.lies import strangers_lies, vehicles_lies
 

@@ -9,9 +9,9 @@ import pytest
 from drivers.clock import ScaledClock
 from mission.autopilot import AutopilotKind
 from mission.autopilot_mavsdk import MavsdkAutopilot
-from mission.simulation import free_udp_port, sitl_settings
+from mission.simulated.simulation import free_udp_port, sitl_settings
 from sitl.server import run
-from sitl.world import load_world
+from sitl.world.file import load_world
 
 
 @pytest.fixture

@@ -12,15 +12,16 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from drivers.camera.camera import Intrinsics
-from sitl.ground import build_texture, dither, light_ground, map_ground
-from sitl.lens import CameraMount, camera_pose, lens_vector, pinhole, ray_table
-from sitl.linework import build_layers, cast_shadow
-from sitl.map import render_map
 from sitl.pose import Pose
-from sitl.projection import project_point
-from sitl.render import Renderer, merge_layer
-from sitl.sensor import Optics, develop, fall_off, noise_table, tone_curve
-from sitl.world import Conductor, World, load_world
+from sitl.render.ground import build_texture, dither, light_ground, map_ground
+from sitl.render.lens import CameraMount, camera_pose, lens_vector, pinhole, ray_table
+from sitl.render.linework import build_layers, cast_shadow
+from sitl.render.map import render_map
+from sitl.render.projection import project_point
+from sitl.render.renderer import Renderer, merge_layer
+from sitl.render.sensor import Optics, develop, fall_off, noise_table, tone_curve
+from sitl.world.file import load_world
+from sitl.world.records import Conductor, World
 
 FLAWLESS = Optics(blur_px=0.0, corner_light=1.0, read_noise=0.0, shot_noise=0.0)
 CAMERA = pinhole(320, 240, math.radians(70.0))
@@ -58,16 +59,29 @@ def linear(image: NDArray[np.uint8]) -> NDArray[np.float64]:
 
 def dim(scene: World) -> World:
     """The same in less light, so that nothing reaches white and light can be summed."""
-    return dataclasses.replace(scene, sun=dataclasses.replace(scene.sun, level=0.4))
+    return dimmed(scene, 0.4)
+
+
+def dimmed(scene: World, level: float) -> World:
+    light = scene.light
+    return dataclasses.replace(
+        scene, light=dataclasses.replace(light, direct=level * light.direct, sky=level * light.sky)
+    )
+
+
+def only(*conductors: Conductor) -> World:
+    """The world with these conductors and no supports."""
+    line = dataclasses.replace(world().line, supports=(), conductors=conductors)
+    return dataclasses.replace(world(), lines=(line,))
 
 
 def one_wire(diameter_m: float) -> World:
     """The world with one level wire, 10 m up over the vehicle's start, and no poles."""
     points = np.array([[0.0, -200.0, -10.0], [0.0, 200.0, -10.0]])
-    return dataclasses.replace(world(), supports=(), conductors=(Conductor(diameter_m, points),))
+    return only(Conductor(diameter_m, points))
 
 
-NO_WIRE = dataclasses.replace(load_world(), supports=(), conductors=())
+NO_WIRE = only()
 
 
 @pytest.mark.parametrize("heading_deg", [0.0, 7.0, 31.0, 45.0, 68.0, 90.0])
@@ -175,7 +189,7 @@ def test_the_same_pose_and_seed_give_the_same_image() -> None:
 
 
 def test_less_light_makes_a_darker_image() -> None:
-    dusk = dataclasses.replace(world(), sun=dataclasses.replace(world().sun, level=0.2))
+    dusk = dimmed(world(), 0.2)
     pose = over_the_line(16.0)
     day, evening = (linear(Renderer(w, CAMERA, optics=FLAWLESS).render(pose, 0)).mean() for w in (world(), dusk))
     assert evening / day == pytest.approx(0.2, abs=0.01)

@@ -9,10 +9,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from sitl.coverage import add_strip, square_below
-from sitl.lens import CameraMount, camera_pose, lens_vector, pinhole
 from sitl.pose import Pose
-from sitl.projection import draw_discs, draw_members
+from sitl.render.coverage import add_strip, square_below
+from sitl.render.lens import CameraMount, camera_pose, lens_vector, pinhole
+from sitl.render.projection import draw_discs, draw_members
 
 FLAT = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
 CYLINDER = np.array([0.3, 0.4, 0.5, 0.6, 0.2, 0.9])

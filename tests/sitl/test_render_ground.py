@@ -7,13 +7,13 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sitl.noise import periodic_noise
-from sitl.pasture import paint_fields, track_at
-from sitl.projection import clip_to_view, project_point
-from sitl.vegetation import Plant, paint_plants
-from sitl.world import Sun
+from sitl.render.noise import periodic_noise
+from sitl.render.pasture import paint_fields, track_at
+from sitl.render.projection import clip_to_view, project_point
+from sitl.render.vegetation import Plant, paint_plants
+from sitl.world.records import Light
 
-SUN = Sun(azimuth_rad=math.radians(90.0), elevation_rad=math.radians(45.0), level=1.0)
+SUN = Light(math.radians(90.0), math.radians(45.0), direct=0.58, sky=0.42, visibility_m=1e4)
 VIEW = np.array([-0.7, 0.7, -0.5, 0.5])
 coordinates = st.lists(st.floats(-20.0, 20.0), min_size=3, max_size=3)
 

@@ -10,8 +10,8 @@ import pytest
 from drivers.camera.camera import Camera, CameraError, Frame, Intrinsics
 from drivers.clock import ScaledClock
 from sitl.camera import SimCamera
-from sitl.lens import pinhole
 from sitl.pose import Pose, PoseBlock
+from sitl.render.lens import pinhole
 
 INTRINSICS = pinhole(160, 120, math.radians(70.0))
 RATE_HZ = 200.0

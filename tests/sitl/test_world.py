@@ -8,8 +8,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sitl.catenary import catenary_parameter_m, hang
-from sitl.world import DEFAULT_WORLD, WorldError, load_world, shipped_worlds
+from sitl.world.catenary import catenary_parameter_m, hang
+from sitl.world.file import DEFAULT_WORLD, WorldError, load_world, shipped_worlds
+from sitl.world.light import LIGHT_NAMES, LIGHTS, LightName
+from sitl.world.records import Light
 
 WORLD = """\
 version: 1
@@ -75,7 +77,7 @@ def test_shipped_worlds_load(name: str) -> None:
     world = load_world(name)
     assert world.name == name
     assert world.conductors
-    assert len(world.axis_ne_m) == len(world.supports) >= 2
+    assert len(world.line.axis_ne_m) == len(world.supports) >= 2
     for conductor in world.conductors:
         assert np.all(conductor.points_ned_m[:, 2] < 0.0)
         assert not conductor.points_ned_m.flags.writeable
@@ -84,13 +86,13 @@ def test_shipped_worlds_load(name: str) -> None:
 def test_the_default_world_starts_beside_the_line_and_faces_it() -> None:
     world = load_world()
     assert world.name == DEFAULT_WORLD
-    start, end = np.array(world.axis_ne_m[0]), np.array(world.axis_ne_m[-1])
+    start, end = np.array(world.line.axis_ne_m[0]), np.array(world.line.axis_ne_m[-1])
     along = (end - start) / np.linalg.norm(end - start)
     foot = start + np.dot(-start, along) * along
     assert np.linalg.norm(foot) == pytest.approx(12.0, abs=0.01)
     nose = np.array([math.cos(world.start_yaw_rad), math.sin(world.start_yaw_rad)])
     assert nose == pytest.approx(foot / np.linalg.norm(foot), abs=0.01)
-    assert min(np.linalg.norm(foot - np.array(pole)) for pole in world.axis_ne_m) > 10.0
+    assert min(np.linalg.norm(foot - np.array(pole)) for pole in world.line.axis_ne_m) > 10.0
     assert np.dot(end - foot, along) > 100.0
     assert np.dot(foot - start, along) > 100.0
 
@@ -100,20 +102,27 @@ def test_a_world_file_is_read_in_ned_and_radians(tmp_path: Path) -> None:
     assert world.name == "mine"
     assert world.origin.latitude_rad == pytest.approx(math.radians(4.9))
     assert world.start_yaw_rad == pytest.approx(math.pi / 2)
-    assert np.array(world.axis_ne_m) == pytest.approx(np.array([[10, -30], [10, 10], [10, 50]]))
+    assert np.array(world.line.axis_ne_m) == pytest.approx(np.array([[10, -30], [10, 10], [10, 50]]))
     (conductor,) = world.conductors
     # The line runs east, so its right is south.
     assert conductor.points_ned_m[[0, 80, 160]] == pytest.approx(
         np.array([[9.2, -30, -9.7], [9.2, 10, -9.7], [9.2, 50, -9.7]])
     )
-    assert world.supports[0].insulators_ned_m == (((9.2, -30.0, -9.5), (9.2, -30.0, -9.7)),)
     assert conductor.points_ned_m[:, 2].max() == pytest.approx(-9.2)
-    assert world.supports[1].arm_ends_ned_m[0] == pytest.approx((11.0, 10.0, -9.5))
+    body, arm, insulator = world.supports[1].members
+    assert body.end_ned_m == world.supports[1].top_ned_m
+    assert arm.start_ned_m == pytest.approx((11.0, 10.0, -9.5))
+    assert insulator.end_ned_m == pytest.approx((9.2, 10.0, -9.7))
 
 
-def test_the_sun_stands_where_it_says(tmp_path: Path) -> None:
-    sun = load_world(write(tmp_path, WORLD + "sun: {azimuth_deg: 90, elevation_deg: 30}\n")).sun
-    assert sun.direction_ned == pytest.approx((0.0, math.cos(math.radians(30)), -0.5))
+def test_the_sun_stands_where_it_says() -> None:
+    light = Light(math.radians(90), math.radians(30), direct=0.5, sky=0.5, visibility_m=1e4)
+    assert light.direction_ned == pytest.approx((0.0, math.cos(math.radians(30)), -0.5))
+
+
+@pytest.mark.parametrize("light", LIGHT_NAMES)
+def test_a_world_can_be_had_in_every_light(light: LightName) -> None:
+    assert load_world(light=light).light == LIGHTS[light]
 
 
 @pytest.mark.parametrize(

@@ -7,11 +7,11 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from sitl.detail import paint_detail
-from sitl.ground import GroundTexture, build_texture
-from sitl.noise import periodic_noise
-from sitl.vegetation import Plant, paint_plants
-from sitl.world import Ground, Sun
+from sitl.render.detail import paint_detail
+from sitl.render.ground import GroundTexture, build_texture
+from sitl.render.noise import periodic_noise
+from sitl.render.vegetation import Plant, paint_plants
+from sitl.world.records import Ground, Light
 
 TEXEL_M = 0.05
 DETAIL_TEXEL_M = 0.005
@@ -41,7 +41,7 @@ _TRACK = _stored(186, 166, 134)
 _PALETTE = np.array([_LUSH, _MEADOW, _STRAW, _TUFT, _SOIL, _TRACK], dtype=np.float64)
 
 
-def paint_pasture(ground: Ground, sun: Sun, axis_ne_m: tuple[tuple[float, float], ...]) -> GroundTexture:
+def paint_pasture(ground: Ground, sun: Light, axis_ne_m: tuple[tuple[float, float], ...]) -> GroundTexture:
     """Paint the ground round a line with poles at `axis_ne_m` (north, east) [m]; same input, same ground."""
     rng = np.random.default_rng(ground.seed)
     fields = _lay_out_fields(rng)

@@ -5,9 +5,9 @@ from numpy.typing import NDArray
 
 from drivers.camera.camera import Intrinsics
 from sitl.pose import Pose
-from sitl.render import Renderer
-from sitl.sensor import Optics
-from sitl.world import World
+from sitl.render.renderer import Renderer
+from sitl.render.sensor import Optics
+from sitl.world.records import World
 
 _ABOVE_M = 20_000.0  # from so high, a pole 10 m tall leans by less than a centimetre for each 20 m off the centre
 _WIRE_PX = 1.3

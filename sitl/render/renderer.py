@@ -1,6 +1,5 @@
 """Renders what a camera on the vehicle sees of the world."""
 
-import dataclasses
 import functools
 import itertools
 
@@ -9,14 +8,14 @@ from numba import njit
 from numpy.typing import NDArray
 
 from drivers.camera.camera import Intrinsics
-from sitl.ground import GroundTexture, GroundView
-from sitl.lens import CameraMount, camera_pose, lens_vector, ray_table
-from sitl.linework import build_layers
-from sitl.pasture import paint_pasture
 from sitl.pose import Pose
-from sitl.projection import clip_to_view, draw_discs, draw_members, project_point
-from sitl.sensor import Optics, blur, develop, fall_off, noise_table, tone_curve
-from sitl.world import World
+from sitl.render.ground import GroundTexture, GroundView
+from sitl.render.lens import CameraMount, camera_pose, lens_vector, ray_table
+from sitl.render.linework import build_layers
+from sitl.render.pasture import paint_pasture
+from sitl.render.projection import clip_to_view, draw_discs, draw_members, project_point
+from sitl.render.sensor import Optics, blur, develop, fall_off, noise_table, tone_curve
+from sitl.world.records import World
 
 _REACH = 1.25  # members are drawn this much beyond the image, so that their width cannot be cut off
 
@@ -26,15 +25,15 @@ _paint = functools.lru_cache(maxsize=2)(paint_pasture)
 
 
 def _ground_of(world: World) -> GroundTexture:
-    """Paint the world's ground, or take it from the last time; the painted shadows fall alike at every light level."""
-    return _paint(world.ground, dataclasses.replace(world.sun, level=1.0), world.axis_ne_m)
+    """Paint the world's ground, or take it from the last time."""
+    return _paint(world.ground, world.light, world.line.axis_ne_m)
 
 
 class Renderer:
     """Renders a world for one camera; the same pose and `seq` give the same image, to the bit.
 
     `intrinsics` may have distortion; `mount` is where the camera sits on the vehicle; `seed` is the noise's.
-    `wire_at_least_m` is for maps: see sitl.linework.build_layers.
+    `wire_at_least_m` is for maps: see sitl.render.linework.build_layers.
     """
 
     def __init__(
@@ -52,7 +51,7 @@ class Renderer:
         self._optics = Optics() if optics is None else optics
         self._seed = seed
         self._layers = build_layers(world, wire_at_least_m)
-        self._sun_ned = np.array(world.sun.direction_ned)
+        self._sun_ned = np.array(world.light.direction_ned)
         self._lens = lens_vector(intrinsics)
         self._rays = ray_table(intrinsics)
         self._ground = GroundView(_ground_of(world), self._rays, intrinsics.fx_px)
@@ -94,7 +93,7 @@ class Renderer:
         develop(
             light.reshape(len(light), -1),
             self._fall_off,
-            self._world.sun.level,
+            self._world.light.direct + self._world.light.sky,
             self._optics.read_noise,
             self._optics.shot_noise,
             self._noise,

@@ -2,101 +2,28 @@
 
 import itertools
 import math
-from dataclasses import dataclass
 from importlib import resources
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 import yaml
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, ValidationError, model_validator
 
-from sitl.catenary import hang
 from sitl.place import Origin
+from sitl.world.catenary import hang
+from sitl.world.height_grid import HeightGrid
+from sitl.world.light import LIGHTS, LightName
+from sitl.world.records import Conductor, Ground, GroundStyle, Material, Member, PointNed, PowerLine, Support, World
 
 DEFAULT_WORLD = "medium_voltage"
 CONDUCTOR_STEP_M = 0.5
-
-Material = Literal["concrete", "wood"]
-GroundStyle = Literal["pasture"]
+_MARGIN_M = 100.0
+_PIN_DIAMETER_M = 0.11
 
 
 class WorldError(Exception):
     """A world could not be read; the message is one sentence for a person."""
-
-
-@dataclass(frozen=True, slots=True)
-class Support:
-    """A pole with its cross-arm. Points are NED [m]; the arm ends are the left and the right one along the line.
-
-    `insulators_ned_m` holds foot and top of each conductor's insulator.
-    """
-
-    base_ned_m: tuple[float, float, float]
-    top_ned_m: tuple[float, float, float]
-    base_diameter_m: float
-    top_diameter_m: float
-    arm_ends_ned_m: tuple[tuple[float, float, float], tuple[float, float, float]]
-    arm_thickness_m: float
-    insulators_ned_m: tuple[tuple[tuple[float, float, float], tuple[float, float, float]], ...]
-    material: Material
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Conductor:
-    """A conductor as a polyline (n, 3) float64 [m] NED, read-only."""
-
-    diameter_m: float
-    points_ned_m: NDArray[np.float64]
-
-    def __post_init__(self) -> None:
-        points = np.array(self.points_ned_m, dtype=np.float64)
-        if points.ndim != 2 or points.shape[1] != 3 or len(points) < 2:
-            raise ValueError(f"A conductor's points must be (n, 3) with n >= 2, not {points.shape}.")
-        points.flags.writeable = False
-        object.__setattr__(self, "points_ned_m", points)
-
-
-@dataclass(frozen=True, slots=True)
-class Ground:
-    """How the ground, the plane down = 0, looks; the same seed gives the same ground."""
-
-    style: GroundStyle
-    seed: int
-
-
-@dataclass(frozen=True, slots=True)
-class Sun:
-    """Where the sun stands [rad] (azimuth from north, clockwise) and how bright the scene is: 1 is a clear day."""
-
-    azimuth_rad: float
-    elevation_rad: float
-    level: float
-
-    @property
-    def direction_ned(self) -> tuple[float, float, float]:
-        """The unit vector towards the sun, NED."""
-        horizontal = math.cos(self.elevation_rad)
-        return (
-            horizontal * math.cos(self.azimuth_rad),
-            horizontal * math.sin(self.azimuth_rad),
-            -math.sin(self.elevation_rad),
-        )
-
-
-@dataclass(frozen=True, slots=True)
-class World:
-    """What stands in the world, NED [m] from where the vehicle starts. `axis_ne_m` is the line seen from above."""
-
-    name: str
-    origin: Origin
-    start_yaw_rad: float
-    axis_ne_m: tuple[tuple[float, float], ...]
-    supports: tuple[Support, ...]
-    conductors: tuple[Conductor, ...]
-    ground: Ground
-    sun: Sun
 
 
 class _Model(BaseModel):
@@ -164,19 +91,13 @@ class _GroundModel(_Model):
     seed: int = Field(default=0, ge=0)
 
 
-class _SunModel(_Model):
-    azimuth_deg: float = 60.0
-    elevation_deg: float = Field(default=50.0, ge=10, le=90)
-    level: float = Field(default=1.0, gt=0, le=1)
-
-
 class _WorldModel(_Model):
     version: Literal[1]
     origin: _OriginModel
     start_yaw_deg: float = 0.0
     line: _LineModel
     ground: _GroundModel = _GroundModel()
-    sun: _SunModel = _SunModel()
+    light: LightName = "noon"
 
 
 def shipped_worlds() -> list[str]:
@@ -185,8 +106,10 @@ def shipped_worlds() -> list[str]:
     return sorted(entry.name.removesuffix(".yaml") for entry in folder.iterdir() if entry.name.endswith(".yaml"))
 
 
-def load_world(name_or_path: str | None = None) -> World:
+def load_world(name_or_path: str | None = None, light: LightName | None = None) -> World:
     """Read a world: the name of a shipped one, or the path of a YAML file; None is the default world.
+
+    `light` takes the place of the file's.
 
     Raises WorldError, with a sentence that names the file and the key, when there is no such world or it is wrong.
     """
@@ -206,7 +129,7 @@ def load_world(name_or_path: str | None = None) -> World:
             ) from None
         except (OSError, UnicodeDecodeError) as error:
             raise WorldError(f"The world file {where} cannot be read as text: {error}.") from error
-    return _build(name, _parse(text, where))
+    return _build(name, _parse(text, where), light)
 
 
 def _parse(text: str, where: str) -> _WorldModel:
@@ -223,34 +146,40 @@ def _parse(text: str, where: str) -> _WorldModel:
         raise WorldError(f"The world file {where} is wrong at {key}: {message}.") from error
 
 
-def _build(name: str, model: _WorldModel) -> World:
+def _build(name: str, model: _WorldModel, light: LightName | None) -> World:
     line = model.line
     heading_rad = math.radians(line.heading_deg)
     along = (math.cos(heading_rad), math.sin(heading_rad))
     right = (-along[1], along[0])
 
-    def at(i_pole: int, lateral_m: float, height_m: float) -> tuple[float, float, float]:
+    def at(i_pole: int, lateral_m: float, height_m: float) -> PointNed:
         """The point `lateral_m` right of pole `i_pole` when looking along the line, at a height above the ground."""
         north_m = line.first_pole.north_m + i_pole * line.span_m * along[0] + lateral_m * right[0]
         east_m = line.first_pole.east_m + i_pole * line.span_m * along[1] + lateral_m * right[1]
         return north_m, east_m, -height_m
 
-    half_arm_m = line.cross_arm.length_m / 2.0
     supports = tuple(
         Support(
-            base_ned_m=at(i, 0.0, 0.0),
-            top_ned_m=at(i, 0.0, line.pole.height_m),
-            base_diameter_m=line.pole.base_diameter_m,
-            top_diameter_m=line.pole.top_diameter_m,
-            arm_ends_ned_m=(at(i, -half_arm_m, line.cross_arm.height_m), at(i, half_arm_m, line.cross_arm.height_m)),
-            arm_thickness_m=line.cross_arm.thickness_m,
-            insulators_ned_m=tuple(
-                (at(i, c.lateral_m, _foot_height_m(line, c)), at(i, c.lateral_m, c.height_m)) for c in line.conductors
+            "concrete_pole" if line.pole.material == "concrete" else "wood_pole",
+            at(i, 0.0, 0.0),
+            at(i, 0.0, line.pole.height_m),
+            heading_rad,
+            _members(line, [at(i, side * line.cross_arm.length_m / 2.0, line.cross_arm.height_m) for side in (-1, 1)])
+            + tuple(
+                Member(
+                    at(i, c.lateral_m, _foot_height_m(line, c)),
+                    at(i, c.lateral_m, c.height_m),
+                    _PIN_DIAMETER_M,
+                    0.8 * _PIN_DIAMETER_M,
+                    "porcelain",
+                )
+                for c in line.conductors
             ),
-            material=line.pole.material,
         )
         for i in range(line.n_poles)
     )
+    axis = tuple(support.base_ned_m[:2] for support in supports)
+    norths, easts = [0.0, *(n for n, _ in axis)], [0.0, *(e for _, e in axis)]
     return World(
         name=name,
         origin=Origin(
@@ -259,14 +188,35 @@ def _build(name: str, model: _WorldModel) -> World:
             model.origin.altitude_m,
         ),
         start_yaw_rad=math.radians(model.start_yaw_deg),
-        axis_ne_m=tuple(support.base_ned_m[:2] for support in supports),
-        supports=supports,
-        conductors=tuple(
-            _string(c.diameter_m, c.sag_m, [at(i, c.lateral_m, c.height_m) for i in range(line.n_poles)])
-            for c in line.conductors
+        lines=(
+            PowerLine(
+                axis,
+                supports,
+                tuple(
+                    _string(c.diameter_m, c.sag_m, [at(i, c.lateral_m, c.height_m) for i in range(line.n_poles)])
+                    for c in line.conductors
+                ),
+            ),
+        ),
+        terrain=HeightGrid.flat(
+            min(norths) - _MARGIN_M, min(easts) - _MARGIN_M, max(norths) + _MARGIN_M, max(easts) + _MARGIN_M
         ),
         ground=Ground(model.ground.style, model.ground.seed),
-        sun=Sun(math.radians(model.sun.azimuth_deg), math.radians(model.sun.elevation_deg), model.sun.level),
+        strips=(),
+        buildings=(),
+        trees=(),
+        light=LIGHTS[light or model.light],
+    )
+
+
+def _members(line: _LineModel, arm_ends: list[PointNed]) -> tuple[Member, ...]:
+    """The pole and its cross-arm."""
+    (left, right), pole, thickness_m = arm_ends, line.pole, line.cross_arm.thickness_m
+    north_m, east_m = (left[0] + right[0]) / 2.0, (left[1] + right[1]) / 2.0
+    foot, top = (north_m, east_m, 0.0), (north_m, east_m, -pole.height_m)
+    return (
+        Member(foot, top, pole.base_diameter_m, pole.top_diameter_m, pole.material),
+        Member(left, right, thickness_m, thickness_m, "steel"),
     )
 
 
@@ -276,7 +226,7 @@ def _foot_height_m(line: _LineModel, conductor: _ConductorModel) -> float:
     return line.pole.height_m if is_on_top else line.cross_arm.height_m
 
 
-def _string(diameter_m: float, sag_m: float, attachments: list[tuple[float, float, float]]) -> Conductor:
+def _string(diameter_m: float, sag_m: float, attachments: list[PointNed]) -> Conductor:
     """Hang one conductor over all its supports."""
     spans = [hang(start, end, sag_m, CONDUCTOR_STEP_M) for start, end in itertools.pairwise(attachments)]
     points = np.concatenate([spans[0], *(span[1:] for span in spans[1:])])

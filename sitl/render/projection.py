@@ -6,7 +6,7 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from sitl.coverage import add_strip, ramp
+from sitl.render.coverage import add_strip, ramp
 
 NEAR_M = 0.05
 _PIECE_PX = 12.0  # a lens bends straight lines; pieces of this length follow it within a hundredth of a pixel
@@ -14,7 +14,7 @@ _PIECE_PX = 12.0  # a lens bends straight lines; pieces of this length follow it
 
 @njit(nogil=True, cache=True)  # type: ignore[untyped-decorator]
 def project_point(x: float, y: float, z: float, lens: NDArray[np.float64]) -> tuple[float, float]:
-    """Project a camera-frame point [m], z > 0, to pixels; `lens` is sitl.lens.lens_vector's."""
+    """Project a camera-frame point [m], z > 0, to pixels; `lens` is sitl.render.lens.lens_vector's."""
     a, b = x / z, y / z
     r2 = a * a + b * b
     if lens[9] != 0.0:
@@ -107,7 +107,7 @@ def draw_members(
 ) -> int:
     """Draw straight members into a layer and return how many of them are in view.
 
-    `coverage`, `shaded`: see sitl.coverage.add_strip. `members` is (n, 9): both ends NED [m], both diameters [m], and a
+    `coverage`, `shaded`: see add_strip. `members` is (n, 9): both ends NED [m], both diameters [m], and a
     brightness. Round ones are lit as cylinders by `material` = (ambient, direct, gloss) and a sun towards `sun_ned`
     (3,); ribbons lie flat on a horizontal plane and show their brightness alone. `centre` (3,) NED [m] and
     `camera_from_ned` (3, 3) are the camera's, `reach` is clip_to_view's.

@@ -1,4 +1,4 @@
-"""The simulated vehicle beside the mission: its process, its camera and its truth. The only file that imports sitl."""
+"""The simulated vehicle beside the mission: its process, its camera and its truth."""
 
 import contextlib
 import functools
@@ -24,11 +24,12 @@ from mission.autopilot import VehicleState
 from mission.records import TrueLine, TruePose
 from sitl.camera import SimCamera
 from sitl.control import quaternion_of
-from sitl.map import render_map
 from sitl.pose import Pose, PoseBlock
+from sitl.render.map import render_map
 from sitl.server import AutopilotName, SitlSettings, SitlSummary, run
 from sitl.setup import SETUP
-from sitl.world import World, WorldError, load_world
+from sitl.world.file import WorldError, load_world
+from sitl.world.records import World
 
 __all__ = [
     "SETUP",
@@ -149,7 +150,7 @@ def sitl_settings(
 def true_line(world: World) -> TrueLine:
     """The world's power line as the log keeps it."""
     return TrueLine(
-        axis_ne_m=world.axis_ne_m,
+        axis_ne_m=world.line.axis_ne_m,
         conductors_ned_m=tuple(
             tuple((float(n), float(e), float(d)) for n, e, d in conductor.points_ned_m)
             for conductor in world.conductors

@@ -6,20 +6,27 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sitl.world import Material, World
+from sitl.world.records import Material, Member, World
 
 _SUN_DIAMETER_RAD = math.radians(0.53)
-_PIN_DIAMETER_M = 0.11
-
-_POLE_BGR: dict[Material, tuple[float, float, float]] = {"concrete": (0.47, 0.54, 0.57), "wood": (0.19, 0.26, 0.34)}
-_ARM_BGR = (0.16, 0.21, 0.25)
-_INSULATOR_BGR = (0.20, 0.24, 0.36)
 _ALUMINIUM_BGR = (0.80, 0.79, 0.77)
+_BGR: dict[Material, tuple[float, float, float]] = {
+    "concrete": (0.47, 0.54, 0.57),
+    "wood": (0.19, 0.26, 0.34),
+    "steel": (0.16, 0.21, 0.25),
+    "porcelain": (0.20, 0.24, 0.36),
+}
+_SURFACE: dict[Material, tuple[float, float, float]] = {  # ambient, direct, gloss
+    "concrete": (0.34, 0.66, 0.0),
+    "wood": (0.34, 0.66, 0.0),
+    "steel": (0.40, 0.60, 0.2),
+    "porcelain": (0.40, 0.55, 0.5),
+}
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Layer:
-    """Members drawn together. What sitl.projection's kernels take; colours are linear light, 0 to 1.
+    """Members drawn together. What sitl.render.projection's kernels take; colours are linear light, 0 to 1.
 
     `members` (n, 9) and `discs` (n, 5) are float64, `material` is (ambient, direct, gloss) as (3,) float64, `bgr` (3,)
     float64. A shadow's layer darkens what lies below it instead of covering it.
@@ -38,34 +45,37 @@ def build_layers(world: World, wire_at_least_m: float = 0.0) -> list[Layer]:
 
     A map draws its conductors at least `wire_at_least_m` [m] thick; their shadows keep to the truth.
     """
-    sun_ned = np.array(world.sun.direction_ned)
+    sun_ned = np.array(world.light.direction_ned)
     upright = 0.42 + 0.58 * -sun_ned[2]  # how bright a horizontal face is: sky and sun
-    poles = [[*s.base_ned_m, *s.top_ned_m, s.base_diameter_m, s.top_diameter_m, 1.0] for s in world.supports]
-    tops = [[*s.top_ned_m, s.top_diameter_m, upright] for s in world.supports]
-    arms = [
-        [*s.arm_ends_ned_m[0], *s.arm_ends_ned_m[1], s.arm_thickness_m, s.arm_thickness_m, upright]
-        for s in world.supports
-    ]
-    pins = [
-        [*foot, *top, _PIN_DIAMETER_M, 0.8 * _PIN_DIAMETER_M, 1.0]
-        for s in world.supports
-        for foot, top in s.insulators_ned_m
-    ]
-    pin_tops = [[*top, 0.8 * _PIN_DIAMETER_M, upright] for s in world.supports for _, top in s.insulators_ned_m]
+    members = [member for support in world.supports for member in support.members]
+    by_material = {material: [m for m in members if m.material == material] for material in _BGR}
     wires = [_wire(conductor.points_ned_m, conductor.diameter_m) for conductor in world.conductors]
     wire = np.concatenate([*wires, np.empty((0, 9))])
     drawn = wire.copy()
     drawn[:, 6:8] = np.maximum(wire[:, 6:8], wire_at_least_m)
-
-    bodies = [np.array(rows, dtype=np.float64).reshape(-1, 9) for rows in (poles, arms, pins)]
-    shadows = np.concatenate([cast_shadow(body, sun_ned) for body in (*bodies, wire)])
-    pole_bgr = _POLE_BGR[world.supports[0].material] if world.supports else _POLE_BGR["concrete"]
+    shadows = np.concatenate([cast_shadow(body, sun_ned) for body in (_rows(members), wire)])
     return [
         _layer(shadows, [], (0.0, 0.0, 0.0), (0.30, 0.24, 0.20), is_ribbon=True, is_shadow=True),
-        _layer(bodies[0], tops, (0.34, 0.66, 0.0), pole_bgr),
-        _layer(bodies[1], [], (0.0, 0.0, 0.0), _ARM_BGR, is_ribbon=True),
-        _layer(bodies[2], pin_tops, (0.40, 0.55, 0.5), _INSULATOR_BGR),
+        *(
+            _layer(_rows(bars), _tops(bars, upright), _SURFACE[material], _BGR[material])
+            for material, bars in by_material.items()
+            if bars
+        ),
         _layer(drawn, [], (0.45, 0.55, 0.55), _ALUMINIUM_BGR),
+    ]
+
+
+def _rows(members: list[Member]) -> NDArray[np.float64]:
+    rows = [[*m.start_ned_m, *m.end_ned_m, m.start_diameter_m, m.end_diameter_m, 1.0] for m in members]
+    return np.array(rows, dtype=np.float64).reshape(-1, 9)
+
+
+def _tops(members: list[Member], brightness: float) -> list[list[float]]:
+    """The upper faces of what stands upright."""
+    return [
+        [*m.end_ned_m, m.end_diameter_m, brightness]
+        for m in members
+        if m.start_ned_m[:2] == m.end_ned_m[:2] and m.end_ned_m[2] < m.start_ned_m[2]
     ]
 
 

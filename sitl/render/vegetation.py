@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from sitl.world import Sun
+from sitl.world.records import Light
 
 _HEIGHT_PER_RADIUS = 1.5
 _N_SHAPES = 4
@@ -24,7 +24,7 @@ class Plant:
 
 
 def paint_plants(
-    picture: NDArray[np.uint8], plants: list[Plant], texel_m: float, sun: Sun, rng: np.random.Generator
+    picture: NDArray[np.uint8], plants: list[Plant], texel_m: float, sun: Light, rng: np.random.Generator
 ) -> None:
     """Paint plants into `picture` (side, side, 4) uint8 (GroundTexture.surface), over all of whose edges they wrap."""
     # A few shapes of each size do for all; growing one takes longer than painting it.
@@ -78,7 +78,7 @@ def _window(
 
 
 def _paint_shadow(
-    picture: NDArray[np.uint8], plant: Plant, crown: NDArray[np.float32], texel_m: float, sun: Sun
+    picture: NDArray[np.uint8], plant: Plant, crown: NDArray[np.float32], texel_m: float, sun: Light
 ) -> None:
     """Darken the ground where the crown, swept from its lower edge to its top, stands before the sun."""
     reach_m = _HEIGHT_PER_RADIUS * plant.radius_m / math.tan(sun.elevation_rad)
@@ -111,7 +111,7 @@ def _paint_crown(
     plant: Plant,
     crown: NDArray[np.float32],
     texel_m: float,
-    sun: Sun,
+    sun: Light,
     rng: np.random.Generator,
 ) -> None:
     """Paint a crown, lit by the sun and darker in the hollows between its clumps."""

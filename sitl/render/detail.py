@@ -4,7 +4,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from sitl.noise import periodic_noise
+from sitl.render.noise import periodic_noise
 
 SIDE = 2048
 _CONTRAST = 0.115  # standard deviation of the brightness, of 1; the textures' channels hold +- 4 of it

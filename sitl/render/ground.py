@@ -83,7 +83,7 @@ def map_ground(
 ) -> None:
     """Find where in a texture's atlas each pixel looks: `columns` and `rows` (height, width) float32, for cv2.remap.
 
-    `rays` is sitl.lens.ray_table's. `thresholds` is dither()'s: pixel by pixel it chooses between the two mip levels
+    `rays` is lens.ray_table's. `thresholds` is dither()'s: pixel by pixel it chooses between the two mip levels
     that fit, so that no edge shows where the level changes, at half the price of mixing them. `centre` (3,) NED [m]
     and `ned_from_camera` (3, 3) are the camera's, `levels` and `texel_m` the Texture's. Sky maps to outside the atlas.
     """
@@ -147,7 +147,7 @@ def light_ground(light: NDArray[np.float32], surface: NDArray[np.uint8], detail:
 
 
 class GroundView:
-    """The ground seen by one camera; keeps the buffers between frames. `rays` is sitl.lens.ray_table's."""
+    """The ground seen by one camera; keeps the buffers between frames. `rays` is sitl.render.lens.ray_table's."""
 
     def __init__(self, ground: GroundTexture, rays: NDArray[np.float32], f_px: float) -> None:
         self._ground = ground
