@@ -8,11 +8,11 @@ from typing import cast
 from mission.autopilot import Setpoint
 from mission.eyes import Notice
 from mission.hazards import ComputerView
+from mission.simulated.virtual_time import VirtualTimeLoop
 from mission.tasks.task import Observation, Step
 from sitl.modes import Mode
 from sitl.wind import Wind
 from tests.support.flights import Cockpit
-from tests.support.virtual_time import VirtualTimeLoop
 from vision.records import VisionReport
 
 

@@ -9,8 +9,8 @@ from sitl.autopilot import SimAutopilot
 from sitl.modes import Mode
 from tests.faults.faults import FAULTS, Fault
 from tests.faults.table import End
+from tests.support.faulty_autopilot import FaultyAutopilot
 from tests.support.flights import LINE_HEADING_RAD, LINE_POINT_NED_M, Cockpit, Flown, fly
-from tests.support.in_process import InProcessAutopilot
 
 TAKEOFF = {"task": "takeoff", "altitude_m": 4.0}
 UP = {"task": "ascend", "altitude_m": 16.0}
@@ -54,7 +54,7 @@ class Watchdog:
 
     def __init__(self, fault: Fault) -> None:
         self._fault = fault
-        self._autopilot: InProcessAutopilot | None = None
+        self._autopilot: FaultyAutopilot | None = None
         self._has_struck = False
         self._struck_s = 0.0
         self._commands: list[str] = []

@@ -11,8 +11,10 @@ from mission.autopilot import LandedState, Setpoint, VehicleState
 from mission.executive import Executive
 from mission.plan import MissionPlan, VehiclePlan
 from mission.records import Result, TaskEnded, TaskStarted
+from mission.simulated.virtual_time import VirtualClock, run_virtually
 from mission.tasks.task import Observation, Step
 from sitl.modes import Mode
+from tests.support.faulty_autopilot import FaultyAutopilot
 from tests.support.flights import (
     ALL_TASKS_PLAN,
     LINE_HEADING_RAD,
@@ -23,8 +25,6 @@ from tests.support.flights import (
     fly,
     shipped,
 )
-from tests.support.in_process import InProcessAutopilot
-from tests.support.virtual_time import VirtualClock, run_virtually
 
 TASKS = [task.task for task in ALL_TASKS_PLAN.tasks]
 
@@ -266,12 +266,12 @@ def test_offboard_that_was_accepted_and_never_came_leaves_the_vehicle_in_its_own
     assert flown.autopilot.sim.mode is Mode.LOITER
 
 
-def fly_with(spoil: Callable[[InProcessAutopilot], None]) -> tuple[Executive, InProcessAutopilot, Result]:
+def fly_with(spoil: Callable[[FaultyAutopilot], None]) -> tuple[Executive, FaultyAutopilot, Result]:
     """A flight whose vehicle is spoilt before it begins."""
 
-    async def flight() -> tuple[Executive, InProcessAutopilot, Result]:
+    async def flight() -> tuple[Executive, FaultyAutopilot, Result]:
         clock = VirtualClock()
-        autopilot = InProcessAutopilot(clock)
+        autopilot = FaultyAutopilot(clock)
         spoil(autopilot)
         # The autopilot disarms a vehicle that does not take off after ten seconds; we give up before.
         plan = ALL_TASKS_PLAN.model_copy(update={"vehicle": VehiclePlan(ready_time_limit_s=9.0)})
@@ -298,7 +298,7 @@ def test_an_arming_without_an_answer_is_brought_down() -> None:
 
 
 def test_a_vehicle_that_is_armed_already_is_left_to_whoever_armed_it() -> None:
-    def arm_by_hand(autopilot: InProcessAutopilot) -> None:
+    def arm_by_hand(autopilot: FaultyAutopilot) -> None:
         loop = asyncio.get_running_loop()
         loop.call_later(4.5, lambda: (autopilot.catch_up(), autopilot.sim.arm()))
 
@@ -410,7 +410,7 @@ def test_a_bug_in_a_task_brings_the_vehicle_down() -> None:
 def test_before_arming_ctrl_c_ends_at_once() -> None:
     async def flight() -> tuple[Result, list[str]]:
         clock = VirtualClock()
-        autopilot = InProcessAutopilot(clock)
+        autopilot = FaultyAutopilot(clock)
         executive = bare_executive(ALL_TASKS_PLAN, autopilot, clock)
         asyncio.get_running_loop().call_later(1.0, executive.request_stop)
         ended = await executive.run()
@@ -422,7 +422,7 @@ def test_before_arming_ctrl_c_ends_at_once() -> None:
 def test_ctrl_c_while_connecting_does_not_wait_for_the_vehicle() -> None:
     async def flight() -> tuple[Result, int]:
         clock = VirtualClock()
-        autopilot = InProcessAutopilot(clock)
+        autopilot = FaultyAutopilot(clock)
         autopilot.connect = asyncio.Event().wait  # type: ignore[method-assign,assignment]  # nobody is there
         executive = bare_executive(ALL_TASKS_PLAN, autopilot, clock)
         asyncio.get_running_loop().call_later(1.0, executive.request_stop)

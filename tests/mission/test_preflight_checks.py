@@ -18,11 +18,11 @@ from mission.plan import VehiclePlan
 from mission.preflight import wait_until_ready
 from mission.preflight_checks import Facts, check_all
 from mission.records import CheckResult, MissionEnded, PreflightCheck, Result
+from mission.simulated.virtual_time import VirtualClock, run_virtually
 from tests.mission.test_parameter_checks import GOOD
+from tests.support.faulty_autopilot import FaultyAutopilot
 from tests.support.flights import LINE_HEADING_RAD, LINE_POINT_NED_M, PAPERS, KeptLog, shipped
 from tests.support.geometric_eyes import GeometricEyes
-from tests.support.in_process import InProcessAutopilot
-from tests.support.virtual_time import VirtualClock, run_virtually
 
 OK, WARNING, FAILED = CheckResult.OK, CheckResult.WARNING, CheckResult.FAILED
 PLAN = shipped("follow_line")
@@ -124,13 +124,13 @@ def test_the_parameters_of_other_autopilots_are_not_checked() -> None:
 
 
 def wait(
-    spoil: Callable[[InProcessAutopilot, GeometricEyes], None], time_limit_s: float = 60.0
+    spoil: Callable[[FaultyAutopilot, GeometricEyes], None], time_limit_s: float = 60.0
 ) -> tuple[dict[str, Check], float]:
     """The checks when waiting was over, and how long that took [s]."""
 
     async def waiting() -> tuple[dict[str, Check], float]:
         clock = VirtualClock()
-        autopilot = InProcessAutopilot(clock)
+        autopilot = FaultyAutopilot(clock)
         eyes = GeometricEyes(
             autopilot.true_pose, clock, pinhole_intrinsics(PLAN.camera), LINE_POINT_NED_M, LINE_HEADING_RAD
         )
@@ -144,7 +144,7 @@ def wait(
     return run_virtually(waiting())
 
 
-def nothing(autopilot: InProcessAutopilot, eyes: GeometricEyes) -> None:
+def nothing(autopilot: FaultyAutopilot, eyes: GeometricEyes) -> None:
     pass
 
 
@@ -155,7 +155,7 @@ def test_a_sound_vehicle_gets_ready_without_a_warning() -> None:
 
 
 def test_bad_parameters_end_the_wait_at_once() -> None:
-    def spoil(autopilot: InProcessAutopilot, eyes: GeometricEyes) -> None:
+    def spoil(autopilot: FaultyAutopilot, eyes: GeometricEyes) -> None:
         autopilot.sim.set_parameter("COM_OBL_RC_ACT", 0)
 
     checks, took_s = wait(spoil)
@@ -164,7 +164,7 @@ def test_bad_parameters_end_the_wait_at_once() -> None:
 
 
 def test_what_may_still_come_is_waited_for_until_the_limit() -> None:
-    def spoil(autopilot: InProcessAutopilot, eyes: GeometricEyes) -> None:
+    def spoil(autopilot: FaultyAutopilot, eyes: GeometricEyes) -> None:
         eyes.missing = "the first frame through vision"
 
     checks, took_s = wait(spoil, time_limit_s=30.0)
@@ -173,7 +173,7 @@ def test_what_may_still_come_is_waited_for_until_the_limit() -> None:
 
 
 def test_a_link_that_fails_is_told_with_its_reason() -> None:
-    def spoil(autopilot: InProcessAutopilot, eyes: GeometricEyes) -> None:
+    def spoil(autopilot: FaultyAutopilot, eyes: GeometricEyes) -> None:
         async def connect() -> None:
             raise AutopilotError("the connection nowhere does not open")
 
@@ -185,7 +185,7 @@ def test_a_link_that_fails_is_told_with_its_reason() -> None:
 
 
 def test_a_failure_that_lasts_a_moment_only_ends_nothing() -> None:
-    def spoil(autopilot: InProcessAutopilot, eyes: GeometricEyes) -> None:
+    def spoil(autopilot: FaultyAutopilot, eyes: GeometricEyes) -> None:
         autopilot.sim.battery.remaining = 0.1
         asyncio.get_running_loop().call_later(0.7, lambda: setattr(autopilot.sim.battery, "remaining", 1.0))
 
@@ -196,9 +196,9 @@ def test_a_failure_that_lasts_a_moment_only_ends_nothing() -> None:
 def test_a_refused_vehicle_is_never_armed_and_the_log_says_why() -> None:
     told: list[Check] = []
 
-    async def flight() -> tuple[MissionEnded, KeptLog, InProcessAutopilot]:
+    async def flight() -> tuple[MissionEnded, KeptLog, FaultyAutopilot]:
         clock, log = VirtualClock(), KeptLog(lambda item: None)
-        autopilot = InProcessAutopilot(clock)
+        autopilot = FaultyAutopilot(clock)
         autopilot.sim.set_parameter("RTL_RETURN_ALT", 12.0)
         camera = pinhole_intrinsics(PLAN.camera)
         eyes = GeometricEyes(autopilot.true_pose, clock, camera, LINE_POINT_NED_M, LINE_HEADING_RAD)

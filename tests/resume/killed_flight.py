@@ -8,9 +8,9 @@ from pathlib import Path
 from mission.journal import DiskJournal, JournalError, Transition, read_journal
 from mission.records import MissionEnded, TaskEnded
 from mission.resumption import CannotResumeError, find_resumption
+from mission.simulated.virtual_time import VirtualClock, run_virtually
+from tests.support.faulty_autopilot import FaultyAutopilot
 from tests.support.flights import ALL_TASKS_PLAN, PAPERS, START_YAW_RAD, KeptLog, bare_executive
-from tests.support.in_process import InProcessAutopilot
-from tests.support.virtual_time import VirtualClock, run_virtually
 
 SHA256 = PAPERS.mission_sha256
 
@@ -46,7 +46,7 @@ def kill_and_resume(folder: Path, kill_s: float, away_s: float) -> Aftermath:
 
     async def flight() -> Aftermath:
         clock = VirtualClock()
-        autopilot = InProcessAutopilot(clock, start_yaw_rad=START_YAW_RAD)
+        autopilot = FaultyAutopilot(clock, start_yaw_rad=START_YAW_RAD)
         disk, first_log, second_log = Disk(), KeptLog(lambda _: None), KeptLog(lambda _: None)
         journal = DiskJournal(folder / "first.journal", disk.run)
         first = bare_executive(ALL_TASKS_PLAN, autopilot, clock, log=first_log, journal=journal)
@@ -64,7 +64,7 @@ def kill_and_resume(folder: Path, kill_s: float, away_s: float) -> Aftermath:
 
         refusal, ended = None, None
         journalled: list[str] = []
-        second_link = InProcessAutopilot(clock, sim=autopilot.sim)
+        second_link = FaultyAutopilot(clock, sim=autopilot.sim)
         try:
             begin, entries = read_journal(folder / "first.journal")
             journalled = [entry.target for entry in entries if isinstance(entry, Transition)]

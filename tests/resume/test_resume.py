@@ -12,16 +12,16 @@ from mission.autopilot import GlobalPoint
 from mission.journal import DiskJournal, JournalError, Transition, newest_journal, read_journal
 from mission.records import MissionEnded, Result, TaskEnded
 from mission.resumption import CannotResumeError, explain_resumption, find_resumption
+from mission.simulated.virtual_time import VirtualClock, run_virtually
 from sitl.autopilot import SimAutopilot
 from sitl.modes import Mode
 from tests.faults.flight import clearance_m
 from tests.resume.killed_flight import SHA256, Disk
+from tests.support.faulty_autopilot import FaultyAutopilot
 from tests.support.flights import ALL_TASKS_PLAN, PAPERS, START_YAW_RAD, KeptLog, bare_executive
-from tests.support.in_process import InProcessAutopilot
-from tests.support.virtual_time import VirtualClock, run_virtually
 
 CLEARANCE_M = 2.0
-Act = Callable[[InProcessAutopilot], None]
+Act = Callable[[FaultyAutopilot], None]
 
 
 @dataclass
@@ -50,12 +50,12 @@ def fly_in_stages(folder: Path, *stages: Stage) -> Story:
 
     async def flight() -> Story:
         clock, story = VirtualClock(), Story()
-        link = InProcessAutopilot(clock, start_yaw_rad=START_YAW_RAD)
+        link = FaultyAutopilot(clock, start_yaw_rad=START_YAW_RAD)
         sim = story.sim = link.sim
         plan, resumption = ALL_TASKS_PLAN, None
         for number, stage in enumerate(stages):
             if number > 0:
-                link = InProcessAutopilot(clock, sim=sim)
+                link = FaultyAutopilot(clock, sim=sim)
                 try:
                     begin, entries = read_journal(folder / f"{number - 1}.journal")
                     plan, resumption = find_resumption(begin, entries, ALL_TASKS_PLAN, SHA256)
@@ -93,12 +93,12 @@ def fly_in_stages(folder: Path, *stages: Stage) -> Story:
     return run_virtually(flight())
 
 
-def take_over(link: InProcessAutopilot) -> None:
+def take_over(link: FaultyAutopilot) -> None:
     """The pilot takes the vehicle, and leaves it hovering."""
     link.sim.set_mode(Mode.LOITER)
 
 
-def sink(link: InProcessAutopilot) -> None:
+def sink(link: FaultyAutopilot) -> None:
     """The pilot takes the vehicle by the sticks, and brings it down by some metres."""
     link.sim.set_mode(Mode.LOITER)
     n, e, d = link.sim.vehicle.position_m
@@ -129,7 +129,7 @@ def test_a_resume_that_was_itself_interrupted_is_resumed(tmp_path: Path) -> None
 
 
 def test_a_pilot_who_takes_it_back_before_the_first_command_keeps_it(tmp_path: Path) -> None:
-    class Quick(InProcessAutopilot):
+    class Quick(FaultyAutopilot):
         async def read_origin(self) -> GlobalPoint | None:
             self.sim.set_sticks(0.0, 0.0, 0.5, 0.0)
             self.sim.set_mode(Mode.POSCTL)
@@ -140,7 +140,7 @@ def test_a_pilot_who_takes_it_back_before_the_first_command_keeps_it(tmp_path: P
 
     async def flight() -> tuple[MissionEnded, list[str], Mode]:
         clock = VirtualClock()
-        link = InProcessAutopilot(clock, start_yaw_rad=START_YAW_RAD)
+        link = FaultyAutopilot(clock, start_yaw_rad=START_YAW_RAD)
         journal = DiskJournal(tmp_path / "first.journal", Disk().run)
         first = asyncio.create_task(bare_executive(ALL_TASKS_PLAN, link, clock, journal=journal).run())
         await asyncio.sleep(30.0)
@@ -159,7 +159,7 @@ def test_a_pilot_who_takes_it_back_before_the_first_command_keeps_it(tmp_path: P
     assert commands == []
 
 
-def _land_there(link: InProcessAutopilot) -> None:
+def _land_there(link: FaultyAutopilot) -> None:
     link.sim.set_mode(Mode.LAND)
 
 
@@ -174,7 +174,7 @@ def test_from_another_place_it_is_refused(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("error_m", [-6.0, 6.0])
 def test_an_altitude_that_gps_gives_otherwise_after_a_restart_changes_no_height(error_m: float, tmp_path: Path) -> None:
-    def restart(link: InProcessAutopilot) -> None:
+    def restart(link: FaultyAutopilot) -> None:
         origin = link.sim.origin
         link.sim.origin = replace(origin, altitude_m=origin.altitude_m + error_m)
 
@@ -185,7 +185,7 @@ def test_an_altitude_that_gps_gives_otherwise_after_a_restart_changes_no_height(
 
 
 def test_a_vehicle_in_the_air_whose_autopilot_was_started_anew_is_refused(tmp_path: Path) -> None:
-    def restart(link: InProcessAutopilot) -> None:
+    def restart(link: FaultyAutopilot) -> None:
         origin = link.sim.origin
         link.sim.origin = replace(origin, altitude_m=origin.altitude_m + 6.0)
 
@@ -217,7 +217,7 @@ def test_a_changed_mission_and_another_vehicle_are_refused(journal: Path) -> Non
     with pytest.raises(CannotResumeError, match="has changed since"):
         find_resumption(begin, entries, ALL_TASKS_PLAN, "another")
     plan, resumption = find_resumption(begin, entries, ALL_TASKS_PLAN, SHA256)
-    state = InProcessAutopilot.__new__  # not needed: identity is looked at first
+    state = FaultyAutopilot.__new__  # not needed: identity is looked at first
     origin = resumption.origin.point
     refusal = resumption.refusal(plan, state, "another", origin, is_flying=True)  # type: ignore[arg-type]
     assert refusal is not None
@@ -288,7 +288,7 @@ def test_a_pilot_who_takes_over_while_the_journal_waits_for_its_disk_is_not_foug
 
     async def flight() -> tuple[MissionEnded, list[str], Mode]:
         clock = VirtualClock()
-        link = InProcessAutopilot(clock, start_yaw_rad=START_YAW_RAD)
+        link = FaultyAutopilot(clock, start_yaw_rad=START_YAW_RAD)
         journal = DiskJournal(tmp_path / "slow.journal", slow)
         program = bare_executive(ALL_TASKS_PLAN, link, clock, journal=journal)
         running = asyncio.create_task(program.run())

@@ -19,14 +19,14 @@ from mission.journal import NoJournal
 from mission.logbook import Logbook
 from mission.plan import MissionPlan
 from mission.records import TaskStarted
+from mission.simulated.virtual_time import VirtualClock, run_virtually
 from sitl.autopilot import SimAutopilot
 from sitl.parameters import Parameters
 from sitl.setup import SETUP
 from sitl.vehicle import Vehicle
+from tests.support.faulty_autopilot import FaultyAutopilot
 from tests.support.flights import LINE_HEADING_RAD, LINE_POINT_NED_M, PAPERS, START_YAW_RAD
 from tests.support.geometric_eyes import GeometricEyes
-from tests.support.in_process import InProcessAutopilot
-from tests.support.virtual_time import VirtualClock, run_virtually
 
 _LEG_M = 100.0  # the line that the geometric eyes know is 120 m long, and the vehicle comes to its middle
 _SPEED_M_S = 1.5
@@ -145,7 +145,7 @@ def fly_long(n_tasks: int, *, is_leaking: bool) -> tuple[str, list[Held]]:
         vehicle = Vehicle(yaw_rad=START_YAW_RAD)
         # No noise, and the largest steps that fly: the vehicle is not what is tested, and takes most of the time.
         sim = SimAutopilot(vehicle, parameters=Parameters(SETUP), is_noisy=False)
-        autopilot = InProcessAutopilot(clock, sim=sim, step_s=0.025)
+        autopilot = FaultyAutopilot(clock, sim=sim, step_s=0.025)
         autopilot.after_step.append(lambda: setattr(sim.battery, "remaining", 1.0))
         camera = pinhole_intrinsics(plan.camera)
         eyes = GeometricEyes(autopilot.true_pose, clock, camera, LINE_POINT_NED_M, LINE_HEADING_RAD)

@@ -17,9 +17,9 @@ from mission.plan import MissionPlan
 from mission.plan_file import read_mission
 from mission.records import Event, MissionEnded, TaskEnded, TaskStarted
 from mission.resumption import Resumption
+from mission.simulated.virtual_time import VirtualClock, run_virtually
+from tests.support.faulty_autopilot import FaultyAutopilot
 from tests.support.geometric_eyes import GeometricEyes
-from tests.support.in_process import InProcessAutopilot
-from tests.support.virtual_time import VirtualClock, run_virtually
 
 MISSIONS = Path(__file__).parents[2] / "missions"
 START_YAW_RAD = math.radians(20.0)
@@ -55,7 +55,7 @@ class Flown:
 
     ended: MissionEnded
     log: KeptLog
-    autopilot: InProcessAutopilot
+    autopilot: FaultyAutopilot
     stages: list[str] = field(default_factory=list)
 
     def of(self, kind: type[Any]) -> list[Any]:
@@ -88,7 +88,7 @@ class Cockpit:
     """What a test may touch while the flight goes on."""
 
     executive: Executive
-    autopilot: InProcessAutopilot
+    autopilot: FaultyAutopilot
     eyes: GeometricEyes
     computer: Computer
 
@@ -103,7 +103,7 @@ def shipped(name: str) -> MissionPlan:
 
 def bare_executive(
     plan: MissionPlan,
-    autopilot: InProcessAutopilot,
+    autopilot: FaultyAutopilot,
     clock: VirtualClock,
     *,
     log: KeptLog | None = None,
@@ -131,7 +131,7 @@ def fly(
 
     async def flight() -> Flown:
         clock = VirtualClock()
-        autopilot = InProcessAutopilot(clock, start_yaw_rad=START_YAW_RAD, wind_m_s=wind_m_s, seed=seed)
+        autopilot = FaultyAutopilot(clock, start_yaw_rad=START_YAW_RAD, wind_m_s=wind_m_s, seed=seed)
         camera = pinhole_intrinsics(plan.camera)
         eyes = GeometricEyes(autopilot.true_pose, clock, camera, LINE_POINT_NED_M, LINE_HEADING_RAD)
         computer = Computer()

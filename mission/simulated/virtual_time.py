@@ -30,6 +30,7 @@ class VirtualTimeLoop(asyncio.SelectorEventLoop):
         super().__init__(self._jumping)
 
     def time(self) -> float:
+        """Virtual time now [s]."""
         return self._jumping.now_s
 
     def block(self, wall_s: float) -> None:
@@ -41,19 +42,22 @@ class VirtualClock:
     """The flight's clock on the running virtual loop."""
 
     def now_ns(self) -> int:
+        """Flight time now [ns]."""
         return round(asyncio.get_running_loop().time() * 1e9)
 
     def wall_s(self, flight_s: float) -> float:
+        """How long to sleep [s, virtual] until `flight_s` [s, flight] have passed."""
         return max(0.0, flight_s)
 
 
 def run_virtually(main: Coroutine[Any, Any, T]) -> T:
-    """Run a coroutine on a virtual loop; tasks that it leaves behind are a failure."""
+    """Run a coroutine on a virtual loop; raises RuntimeError when it leaves tasks behind."""
 
     async def guarded() -> T:
         result = await main
         left = [task for task in asyncio.all_tasks() if task is not asyncio.current_task()]
-        assert not left, f"tasks left behind: {left}"
+        if left:
+            raise RuntimeError(f"tasks left behind: {left}")
         return result
 
     with asyncio.Runner(loop_factory=VirtualTimeLoop) as runner:

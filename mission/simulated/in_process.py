@@ -3,7 +3,6 @@
 It shows what MAVLink would: mode and armed state are told once a second, as PX4's heartbeat does.
 """
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
@@ -21,12 +20,11 @@ from mission.autopilot import (
 )
 from sitl.autopilot import SimAutopilot
 from sitl.modes import Answer, Landed, Mode
-from sitl.parameters import Parameters
-from sitl.setup import SETUP
-from sitl.vehicle import Vehicle, euler_of
-from sitl.wind import Wind
+from sitl.vehicle import euler_of
 
-_STEP_S = 0.01
+STEP_S = 0.004
+"""As the simulated vehicle of a dry-run is stepped [s]."""
+
 _MODES = {
     Mode.TAKEOFF: FlightMode.TAKEOFF,
     Mode.LOITER: FlightMode.HOLD,
@@ -43,24 +41,21 @@ _LANDED = {
 
 
 class InProcessAutopilot:
-    """A mission.autopilot.Autopilot. The vehicle is stepped up to the clock whenever anybody asks anything of it."""
+    """A mission.autopilot.Autopilot. `sim` is stepped up to the clock whenever anybody asks anything of it.
+
+    One that is given flies on where another link has left it. `commands` are the names of those given, in order.
+    """
 
     def __init__(
         self,
         clock: Clock,
+        sim: SimAutopilot,
         *,
-        start_yaw_rad: float = 0.0,
-        wind_m_s: float = 0.0,
-        seed: int = 1,
-        sim: SimAutopilot | None = None,
-        step_s: float = _STEP_S,
+        step_s: float = STEP_S,
     ) -> None:
         self._clock = clock
         self._step_s = step_s
-        self.sim = sim or SimAutopilot(
-            Vehicle(yaw_rad=start_yaw_rad), Wind(wind_m_s, seed), seed=seed, parameters=Parameters(SETUP)
-        )
-        """The vehicle; one that is given flies on where another link has left it."""
+        self.sim = sim
         self._heartbeat: tuple[Mode, bool] = (self.sim.mode, self.sim.is_armed)
         self._heartbeat_s = self.sim.boot_s
         self._heartbeat_failsafe = False
@@ -76,11 +71,8 @@ class InProcessAutopilot:
         self._last_state: VehicleState | None = None
         self._is_closed = False
         self.commands: list[str] = []
-        self.n_setpoints = 0
         self._setpoint: tuple[float, float, float, float] | None = None
         self._was_offboard = False
-        self.faults: dict[str, list[str]] = {}
-        """What goes wrong with the next calls of a command: refused, lost (obeyed, unanswered), ignored (answered)."""
 
     def catch_up(self) -> None:
         """Step the vehicle to now."""
@@ -103,8 +95,11 @@ class InProcessAutopilot:
     def _tell_target(self) -> None:
         """POSITION_TARGET_LOCAL_NED, ten times a second."""
         setpoint = self.sim.setpoint
-        if setpoint is not None and None not in setpoint.position_m:
-            self._target = Setpoint(*setpoint.position_m, setpoint.yaw_rad)
+        if setpoint is None:
+            return
+        north_m, east_m, down_m = setpoint.position_m
+        if north_m is not None and east_m is not None and down_m is not None:
+            self._target = Setpoint(north_m, east_m, down_m, setpoint.yaw_rad)
 
     def _repeat_setpoint(self) -> None:
         """MAVSDK's own thread repeats the last setpoint, until a heartbeat says that the mode is another."""
@@ -116,6 +111,7 @@ class InProcessAutopilot:
 
     @property
     def state(self) -> VehicleState | None:
+        """The vehicle now; while nothing comes from it, its last state."""
         self.catch_up()
         if self.tells_us or self._last_state is None:
             self._last_state = self._state_now()
@@ -143,92 +139,90 @@ class InProcessAutopilot:
 
     @property
     def takes_off_in_offboard(self) -> bool:
+        """No: PX4 has a mode of its own for it."""
         return False
 
     @property
     def target(self) -> Setpoint | None:
+        """What the autopilot last said it flies to."""
         self.catch_up()
         return self._target
 
     async def read_origin(self) -> GlobalPoint | None:
+        """Where the local frame's origin lies on Earth."""
         origin = self.sim.origin
         return GlobalPoint(*origin.global_of((0.0, 0.0, 0.0)))
 
     def drain_status_texts(self) -> list[str]:
+        """The texts since the last call."""
         return [text for _, text in self.sim.drain_texts()]
 
     async def connect(self) -> None:
+        """There is nothing to connect."""
         self.catch_up()
 
     def missing_health(self) -> list[str]:
+        """What the autopilot waits for before it could be armed."""
         self.catch_up()
         if self.sim.boot_s < 5.0:
             return ["global position (GPS)"]
         return [] if self.sim.commander.is_armable else ["the autopilot's own arming checks"]
 
     async def identify(self) -> Identity:
+        """PX4, as simulated."""
         return Identity(AutopilotKind.PX4, "1.16.1", "00000000000000000000000000000001")
 
     async def read_parameters(self, names: Sequence[str]) -> dict[str, float]:
+        """Those of the parameters that it has."""
         self.catch_up()
         known = {parameter.name: float(parameter.value) for parameter in self.sim.parameters.all()}
         return {name: known[name] for name in names if name in known}
 
     async def arm(self) -> None:
+        """Arm."""
         self._command("arm", self.sim.arm)
 
     async def takeoff(self, altitude_m: float) -> None:
+        """Take off to `altitude_m` over home."""
         self.catch_up()
         self.sim.set_parameter("MIS_TAKEOFF_ALT", altitude_m)
         self._command("takeoff", self.sim.takeoff)
 
     async def start_offboard(self, setpoint: Setpoint) -> None:
+        """Send the first setpoint, and change to offboard."""
         await self.set_setpoint(setpoint)
         self._command("offboard", lambda: self.sim.set_mode(Mode.OFFBOARD))
 
     async def set_setpoint(self, setpoint: Setpoint) -> None:
+        """Send a setpoint, which is repeated from then on."""
         self.catch_up()
-        faults = self.faults.get("setpoint", [])
-        if faults:
-            raise NoAnswerError(f"the setpoint was {faults.pop(0)}")
-        self.n_setpoints += 1
         self._setpoint = (setpoint.north_m, setpoint.east_m, setpoint.down_m, setpoint.yaw_rad)
         if self.hears_us:
             self.sim.set_position_setpoint(*self._setpoint)
 
     async def hold(self) -> None:
+        """Hold in its own mode."""
         self._command("hold", lambda: self.sim.set_mode(Mode.LOITER))
 
     async def return_home(self) -> None:
+        """Return, and land there."""
         self._command("return", lambda: self.sim.set_mode(Mode.RTL))
 
     async def land(self) -> None:
+        """Land here."""
         self._command("land", self.sim.land)
 
     async def close(self) -> None:
+        """Send nothing any more."""
         self._setpoint = None
         self._is_closed = True
-
-    def die(self) -> None:
-        """The program at this end was killed: nothing more is sent, its own thread's setpoints neither."""
-        self._setpoint = None
-        self._is_closed = True
-        self.hears_us = False
 
     def _command(self, name: str, act: Callable[[], Answer]) -> None:
         self.catch_up()
         self.commands.append(name)
-        faults = self.faults.get(name, [])
-        fault = faults.pop(0) if faults else None
         if not self.hears_us:
             raise NoAnswerError(f"the autopilot did not answer when asked to {name}")
-        if fault == "refused":
-            raise AutopilotError(f"the autopilot refused to {name}: denied")
-        if fault == "ignored":
-            return
         answer = act()
-        if fault == "lost":
-            raise NoAnswerError(f"the autopilot did not answer when asked to {name}")
         if answer is not Answer.ACCEPTED:
             raise AutopilotError(f"the autopilot refused to {name}: {answer.name.lower()}")
 
@@ -236,13 +230,3 @@ class InProcessAutopilot:
         """Where the vehicle truly is: position NED [m], attitude (w, x, y, z)."""
         self.catch_up()
         return self.sim.vehicle.position_m, self.sim.vehicle.quaternion
-
-    @property
-    def true_yaw_rad(self) -> float:
-        """The vehicle's true heading."""
-        return euler_of(self.sim.vehicle.quaternion)[2]
-
-    @property
-    def true_distance_m(self) -> float:
-        """How far the vehicle truly is from where it started, level."""
-        return math.hypot(self.sim.vehicle.position_m[0], self.sim.vehicle.position_m[1])
