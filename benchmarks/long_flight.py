@@ -14,6 +14,7 @@ from benchmarks.line_camera import LineCamera
 from drivers.clock import ScaledClock
 from mission.flight import FlightSetup
 from mission.plan_file import MissionFile, read_mission
+from mission.simulated.scenario import Scenario
 from mission.simulated.simulation import free_udp_port, sitl_settings
 from sitl import autopilot
 from sitl.battery import Battery
@@ -60,7 +61,7 @@ def long_flight(folder: Path, flight_s: float, rate_hz: float) -> Iterator[Fligh
     clock, port, poses = ScaledClock(), free_udp_port(), PoseBlock.create()
     context = multiprocessing.get_context("spawn")
     stop = context.Event()
-    settings = sitl_settings(load_world(), clock, port, 1, 2.0, poses.name)
+    settings = sitl_settings(load_world(), Scenario(wind_m_s=2.0), clock, port, poses.name)
     vehicle = context.Process(target=_serve, args=(settings, stop), name="vehicle", daemon=True)
     vehicle.start()
     try:

@@ -98,7 +98,7 @@ async def fly(
             path,
             mission_text=setup.mission.text,
             mission_name=plan.name,
-            metadata=setup.metadata | _camera_words(setup.mission.camera),
+            metadata=setup.metadata | camera_words(setup.mission.camera),
             clock=clock,
         ) as recorder,
     ):
@@ -127,7 +127,7 @@ async def fly(
         if setup.true_line is not None:
             recorder.record(setup.true_line)
         eyes.start()
-        with _stop_signals(executive.request_stop):
+        with stop_signals(executive.request_stop):
             beating = asyncio.create_task(guard.beat(lambda: executive.tick_s))
             sides = [
                 asyncio.create_task(surroundings.watch()),
@@ -185,7 +185,7 @@ def _papers(setup: FlightSetup, log: Path) -> FlightPapers:
     )
 
 
-def _camera_words(camera: Intrinsics) -> dict[str, str]:
+def camera_words(camera: Intrinsics) -> dict[str, str]:
     """The camera as the log keeps it: what offsets and angles are worth cannot be told without it."""
     return {"camera_intrinsics": json.dumps(asdict(camera))}
 
@@ -215,7 +215,7 @@ async def _feed(feed_pose: Callable[[VehicleState], None], autopilot: MavsdkAuto
 
 
 @contextlib.contextmanager
-def _stop_signals(stop: Callable[[], None]) -> Iterator[None]:
+def stop_signals(stop: Callable[[], None]) -> Iterator[None]:
     """Let STOP_SIGNALS end the flight in order, however often they come."""
     loop = asyncio.get_running_loop()
     for number in STOP_SIGNALS:

@@ -12,6 +12,7 @@ from sitl.render.lens import CameraMount
 from sitl.render.renderer import Renderer
 from sitl.render.sensor import Optics
 from sitl.world.file import WorldError, load_world
+from sitl.world.light import LightName
 
 _JOIN_S = 5.0
 
@@ -21,7 +22,8 @@ class SimCamera:
 
     `world` names the world (sitl.world.load_world), `pose_block` the shared memory that the vehicle writes its pose to.
     Frames come at `rate_hz` of the clock's flight time, as far as the rendering keeps up; those it misses
-    count in `seq`. `seed` is that of the sensor's noise. Entering it paints the world and compiles, which takes
+    count in `seq`. `seed` is that of the sensor's noise, `light`
+    the light of the day (None: the world's own). Entering it paints the world and compiles, which takes
     seconds, and raises CameraError when the world or the pose block is not there.
     """
 
@@ -36,6 +38,7 @@ class SimCamera:
         *,
         mount: CameraMount | None = None,
         optics: Optics | None = None,
+        light: LightName | None = None,
     ) -> None:
         self._world = world
         self._pose_block = pose_block
@@ -45,6 +48,7 @@ class SimCamera:
         self._seed = seed
         self._mount = mount
         self._optics = optics
+        self._light = light
         self._mailbox: Mailbox[Frame] = Mailbox()
         self._stop = threading.Event()
         self._thread: threading.Thread | None = None
@@ -65,7 +69,9 @@ class SimCamera:
                 "start the simulated vehicle first."
             ) from error
         try:
-            renderer = Renderer(load_world(self._world), self._intrinsics, self._mount, self._optics, self._seed)
+            renderer = Renderer(
+                load_world(self._world, self._light), self._intrinsics, self._mount, self._optics, self._seed
+            )
         except WorldError as error:
             poses.close()
             raise CameraError(str(error)) from error

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.camera.camera import Camera, CameraError, CameraLost, Frame
-from drivers.clock import NS_PER_S, ScaledClock
+from drivers.clock import NS_PER_S, Clock, ScaledClock
 from vision.frame_check import FrameCheck, FrameCheckSettings
 from vision.outbox import Outbox
 from vision.pipeline import LineFinder, VisionSettings
@@ -152,7 +152,7 @@ def _reopen(open_camera: Callable[[], Camera], stop: threading.Event) -> Camera 
 class Reporter:
     """Turns frames into reports, and decides which of them carry their image."""
 
-    def __init__(self, finder: LineFinder, clock: ScaledClock, log_rate_hz: float) -> None:
+    def __init__(self, finder: LineFinder, clock: Clock, log_rate_hz: float) -> None:
         self._finder = finder
         self._tracker = LineTracker(TrackSettings())
         self._check = FrameCheck(FrameCheckSettings())

@@ -22,6 +22,7 @@ from drivers.camera.camera import Camera, Intrinsics
 from drivers.clock import ScaledClock
 from mission.autopilot import VehicleState
 from mission.records import TrueLine, TruePose
+from mission.simulated.scenario import Scenario
 from sitl.camera import SimCamera
 from sitl.control import quaternion_of
 from sitl.pose import Pose, PoseBlock
@@ -49,21 +50,17 @@ _STOP_TIMEOUT_S = 5.0
 
 
 class Simulation:
-    """A simulated vehicle in a process of its own, in a world. A context manager; raises WorldError for a bad world.
+    """A simulated vehicle in a process of its own. A context manager; raises WorldError for a bad world."""
 
-    `wind_m_s` is the mean wind, with the gusts that belong to it.
-    """
-
-    def __init__(self, world: str | None, clock: ScaledClock, seed: int, wind_m_s: float) -> None:
-        self.world = load_world(world)
-        self._world_name = world
+    def __init__(self, scenario: Scenario, clock: ScaledClock) -> None:
+        self.world = load_world(scenario.world, scenario.light)
+        self._scenario = scenario
         self._clock = clock
-        self._seed = seed
         self._port = free_udp_port()
         self._poses = PoseBlock.create()
         self._stop = multiprocessing.get_context("spawn").Event()
         self._summaries, self._child_summaries = multiprocessing.get_context("spawn").Pipe(duplex=False)
-        settings = sitl_settings(self.world, clock, self._port, seed, wind_m_s, self._poses.name)
+        settings = sitl_settings(self.world, scenario, clock, self._port, self._poses.name)
         self._process = multiprocessing.get_context("spawn").Process(
             target=_serve, args=(settings, self._stop, self._child_summaries), name="lineflight-sitl", daemon=True
         )
@@ -76,7 +73,7 @@ class Simulation:
 
     def camera_opener(self, camera: Intrinsics, rate_hz: float) -> Callable[[], Camera]:
         """What opens the simulated camera in the vision worker."""
-        return sim_camera_opener(self._world_name, self._poses.name, self._clock, camera, rate_hz, self._seed)
+        return sim_camera_opener(self._scenario, self._poses.name, self._clock, camera, rate_hz)
 
     def true_pose(self) -> TruePose | None:
         """Where the vehicle truly is; None before the first step."""
@@ -112,7 +109,7 @@ class TelemetryCamera:
     def __init__(self, world: str | None, clock: ScaledClock, camera: Intrinsics, rate_hz: float) -> None:
         load_world(world)
         self._poses = PoseBlock.create()
-        self.open_camera = sim_camera_opener(world, self._poses.name, clock, camera, rate_hz, seed=1)
+        self.open_camera = sim_camera_opener(Scenario(world), self._poses.name, clock, camera, rate_hz)
 
     def feed(self, state: VehicleState) -> None:
         """Publish the vehicle's state as the camera's pose."""
@@ -125,20 +122,22 @@ class TelemetryCamera:
 
 
 def sim_camera_opener(
-    world: str | None, pose_block: str, clock: ScaledClock, camera: Intrinsics, rate_hz: float, seed: int
+    scenario: Scenario, pose_block: str, clock: ScaledClock, camera: Intrinsics, rate_hz: float
 ) -> Callable[[], Camera]:
     """What opens a simulated camera that hangs on the poses of `pose_block`; picklable."""
-    return functools.partial(SimCamera, world, pose_block, clock, camera, rate_hz, seed)
+    return functools.partial(
+        SimCamera, scenario.world, pose_block, clock, camera, rate_hz, scenario.seed, light=scenario.light
+    )
 
 
 def sitl_settings(
-    world: World, clock: ScaledClock, port: int, seed: int, wind_m_s: float, pose_block: str | None
+    world: World, scenario: Scenario, clock: ScaledClock, port: int, pose_block: str | None
 ) -> SitlSettings:
     """The simulated vehicle of a world."""
     return SitlSettings(
         port=port,
-        seed=seed,
-        wind_m_s=wind_m_s,
+        seed=scenario.seed,
+        wind_m_s=scenario.wind_m_s,
         clock=clock,
         start_yaw_rad=world.start_yaw_rad,
         origin=world.origin,
@@ -178,15 +177,13 @@ def free_udp_port() -> int:
                 return port
 
 
-def serve_until_stopped(
-    world: str | None, speed: float, port: int, seed: int, wind_m_s: float, autopilot: AutopilotName = "px4"
-) -> SitlSummary:
+def serve_until_stopped(scenario: Scenario, speed: float, port: int, autopilot: AutopilotName = "px4") -> SitlSummary:
     """Run the simulated vehicle in this process until SIGINT or SIGTERM. Raises WorldError."""
     stop = threading.Event()
     for signal_number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(signal_number, lambda _number, _frame: stop.set())
     clock = ScaledClock(speed, ScaledClock().now_ns())
-    settings = sitl_settings(load_world(world), clock, port, seed, wind_m_s, None)
+    settings = sitl_settings(load_world(scenario.world), scenario, clock, port, None)
     return run(replace(settings, autopilot=autopilot), stop.is_set)
 
 

@@ -9,6 +9,7 @@ import pytest
 from drivers.clock import ScaledClock
 from mission.autopilot import AutopilotKind
 from mission.autopilot_mavsdk import MavsdkAutopilot
+from mission.simulated.scenario import Scenario
 from mission.simulated.simulation import free_udp_port, sitl_settings
 from sitl.server import run
 from sitl.world.file import load_world
@@ -18,7 +19,7 @@ from sitl.world.file import load_world
 def connection() -> Iterator[str]:
     """Where a simulated vehicle is heard, at twice real time."""
     port, stop = free_udp_port(), threading.Event()
-    settings = sitl_settings(load_world(None), ScaledClock(2.0), port, 1, 0.0, None)
+    settings = sitl_settings(load_world(None), Scenario(), ScaledClock(2.0), port, None)
     thread = threading.Thread(target=run, args=(settings, stop.is_set))
     thread.start()
     yield f"udpin://127.0.0.1:{port}"
