@@ -38,6 +38,7 @@ def guidance_settings(plan: p.GuidancePlan) -> GuidanceSettings:
         yaw_rate_rad_s=math.radians(plan.yaw_rate_deg_s),
         lateral_per_s=plan.lateral_per_s,
         lateral_max_m_s=plan.lateral_max_m_s,
+        lateral_lead=plan.lateral_lead,
         height_over_line_m=plan.height_over_line_m,
         leash_m=plan.leash_m,
         arrival_m=plan.arrival_m,
@@ -79,14 +80,20 @@ def reactions(plan: p.SafetyPlan) -> Mapping[Hazard, Reaction]:
     return {Hazard(name): Reaction(value) for name, value in plan.reactions.model_dump().items()}
 
 
-def vision_settings(plan: p.VisionPlan, camera: Intrinsics) -> VisionSettings:
-    """The line finder's settings for a camera, with the plan's presence threshold."""
-    defaults = VisionSettings()
+def vision_settings(plan: p.MissionPlan, camera: Intrinsics) -> VisionSettings:
+    """The line finder's settings for a camera, with the plan's thresholds.
+
+    The widest conductor is one of the plan's largest diameter, half as far away as the line should be, and two pixels
+    of the lens's blur more: wheel tracks and kerbs are wider.
+    """
+    defaults, vision = VisionSettings(), plan.vision
+    nearest_m = plan.guidance.height_over_line_m / 2
     return replace(
         defaults,
         camera=camera,
-        presence_min_support=min(1.0, defaults.presence_min_support * plan.presence_scale),
-        presence_min_sigmas=defaults.presence_min_sigmas * plan.presence_scale,
+        max_conductor_width_px=vision.max_conductor_diameter_m / nearest_m * camera.fx_px + 2.0,
+        presence_min_support=min(1.0, defaults.presence_min_support * vision.presence_scale),
+        presence_min_sigmas=defaults.presence_min_sigmas * vision.presence_scale,
     )
 
 
@@ -106,9 +113,9 @@ def build_task(plan: p.AnyTask, guidance: GuidanceSettings, memory: FlightMemory
             is_overhead = plan.until == "overhead"
             return MoveUntilTask(plan.max_distance_m, plan.n_detections, guidance, memory, is_overhead=is_overhead)
         case p.Align():
-            return AlignTask(plan.turn, plan.n_detections, guidance)
+            return AlignTask(plan.turn, plan.n_detections, guidance, memory)
         case p.FollowLines():
-            return FollowLinesTask(plan.distance_m, guidance)
+            return FollowLinesTask(plan.distance_m, guidance, memory)
         case p.Hold():
             return HoldTask(plan.duration_s)
         case p.Return():

@@ -155,7 +155,7 @@ def _settings(
             read = read_mission(mission)
         except MissionFileError as error:
             _fail("\n".join(error.lines()), EXIT_BAD_INPUT)
-        settings, vision = camera_settings(read.plan.camera), vision_settings(read.plan.vision, read.camera)
+        settings, vision = camera_settings(read.plan.camera), vision_settings(read.plan, read.camera)
     if size is not None:
         width_px, height_px = _two_numbers(size, "--size", "640x480")
         settings, vision = replace(settings, width_px=width_px, height_px=height_px), replace(vision, camera=None)

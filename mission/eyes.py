@@ -1,13 +1,14 @@
 """What the executive asks of vision, and how a report is put on the map."""
 
 from collections import deque
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Protocol
 
 from drivers.camera.camera import Intrinsics
 from drivers.clock import NS_PER_S
 from mission.autopilot import VehicleState
 from mission.guidance import GuidanceSettings, locate_line, wrap_angle_rad
+from mission.known_line import KnownLine
 from mission.records import Event, Severity
 from mission.reporting import FlightLog
 from mission.tasks.task import Sight
@@ -147,7 +148,9 @@ def sight_of(
     if report.estimate is not None:
         line = locate_line(report.estimate, state, camera, guidance.height_over_line_m)
         is_whole = group.is_whole(report.estimate.n_lines)
-    return Sight(report.t_capture_ns, state.yaw_rad, report.estimate, line, is_whole)
+    return Sight(
+        report.t_capture_ns, state.yaw_rad, report.estimate, line, is_whole, state.north_m, state.east_m, state.down_m
+    )
 
 
 class Lookout:
@@ -171,8 +174,11 @@ class Lookout:
         self.sight_ns = max(self.sight_ns, now_ns)
         self.line_seen_ns = max(self.line_seen_ns, now_ns)
 
-    def look(self, now_ns: int, state: VehicleState) -> Sight | None:
-        """The newest report since the last look, on the map; the older ones are kept in the log alone."""
+    def look(self, now_ns: int, state: VehicleState, known: KnownLine) -> Sight | None:
+        """The newest report since the last look, on the map; the older ones are kept in the log alone.
+
+        A line that cannot be the known one is none: it neither steers nor keeps the flight from missing its line.
+        """
         self._history.add(state)
         self.keep_notices(now_ns)
         reports = self._eyes.take()
@@ -182,9 +188,22 @@ class Lookout:
             return None
         sight = sight_of(reports[-1], self._history, self._group, self._camera, self._guidance, now_ns)
         if sight is not None:
+            sight = self._recognise(sight, known)
             self.sight_ns = max(self.sight_ns, sight.t_capture_ns)
             if sight.line is not None:
                 self.line_seen_ns = max(self.line_seen_ns, sight.t_capture_ns)
+        return sight
+
+    def _recognise(self, sight: Sight, known: KnownLine) -> Sight:
+        """Take the line out of a sight that shows another one than is known; else know it better."""
+        if sight.line is None or sight.estimate is None or known.line is None:
+            return sight
+        now_s = sight.t_capture_ns / NS_PER_S
+        if not known.is_it(sight.line, sight.north_m, sight.east_m, now_s, is_whole=sight.is_whole):
+            return replace(sight, estimate=None, line=None, is_whole=False)
+        if sight.is_whole:
+            known.follow(sight.line, now_s)
+            known.measure(sight.estimate, self._guidance.height_over_line_m / self._camera.fx_px)
         return sight
 
     def keep_notices(self, now_ns: int) -> None:

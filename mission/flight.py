@@ -105,7 +105,7 @@ async def fly(
         journal = _open_journal(path.with_suffix(SUFFIX))
         camera = setup.mission.camera
         make_worker = functools.partial(
-            VisionWorker, setup.open_camera, vision_settings(plan.vision, camera), clock, plan.vision.log_rate_hz
+            VisionWorker, setup.open_camera, vision_settings(plan, camera), clock, plan.vision.log_rate_hz
         )
         eyes = WorkerEyes(make_worker, clock, clock.wall_s(1.0 / plan.camera.rate_hz))
         autopilot = MavsdkAutopilot(

@@ -44,6 +44,7 @@ class GuidanceSettings:
     yaw_rate_rad_s: float
     lateral_per_s: float
     lateral_max_m_s: float
+    lateral_lead: float
     height_over_line_m: float
     leash_m: float
     arrival_m: float
@@ -137,10 +138,19 @@ def step_along(reference: Setpoint, heading_rad: float, step_m: float) -> Setpoi
 
 
 def step_sideways(
-    reference: Setpoint, line: WorldLine, heading_rad: float, gain_per_s: float, max_m_s: float, dt_s: float
+    reference: Setpoint,
+    line: WorldLine,
+    heading_rad: float,
+    gain_per_s: float,
+    max_m_s: float,
+    dt_s: float,
+    beyond_m: float = 0.0,
 ) -> Setpoint:
-    """Move the reference towards the line, across `heading_rad`: a share of the offset per second, up to `max_m_s`."""
-    offset_m = line.offset_m(reference.north_m, reference.east_m, heading_rad)
+    """Move the reference towards the line, across `heading_rad`: a share of the offset per second, up to `max_m_s`.
+
+    It settles `beyond_m` [m] beyond the line, to the right of it where positive.
+    """
+    offset_m = line.offset_m(reference.north_m, reference.east_m, heading_rad) + beyond_m
     share = 1.0 - math.exp(-gain_per_s * dt_s)
     return step_along(reference, heading_rad + math.pi / 2, _clamp(offset_m * share, max_m_s * dt_s))
 

@@ -185,6 +185,9 @@ class VisionPlan(_Section):
     presence_scale: float = Field(
         1.0, gt=0, le=10, description="Multiplies the presence threshold: above 1 asks for more before a line counts."
     )
+    max_conductor_diameter_m: float = Field(
+        0.04, gt=0, le=0.5, description="What is wider, at the height over the line, is no conductor."
+    )
     log_rate_hz: float = Field(4.0, ge=0, le=30, description="Frames a second that the log keeps.")
 
 
@@ -203,10 +206,16 @@ class GuidancePlan(_Section):
     climb_m_s: float = Field(2.0, gt=0, le=5)
     descend_m_s: float = Field(1.5, gt=0, le=5)
     yaw_rate_deg_s: float = Field(45.0, gt=0, le=120)
-    lateral_per_s: float = Field(0.5, gt=0, le=5, description="Share of the offset taken away, per second (centred).")
+    lateral_per_s: float = Field(4.0, gt=0, le=5, description="Share of the offset taken away, per second (centred).")
     lateral_max_m_s: float = Field(1.0, gt=0, le=5)
+    lateral_lead: float = Field(
+        1.0, ge=0, le=1.5, description="The setpoint goes so far beyond the line as the vehicle is from it (centred)."
+    )
     height_over_line_m: float = Field(
-        6.0, gt=0, le=100, description="Roughly; scales the image offset to metres, an error only changes the gain."
+        6.0,
+        gt=0,
+        le=100,
+        description="Roughly; scales the image offset to metres, and tells conductors from what lies below them.",
     )
     leash_m: float = Field(4.0, gt=0, le=20, description="The setpoint never runs further ahead of the vehicle.")
     arrival_m: float = Field(0.6, gt=0, le=5, description="The vehicle is there when it is this near.")

@@ -93,7 +93,7 @@ class Situation:
         try:
             self.keep_words()
             self._eyes_view = self._view_of_eyes()
-            sight = self._lookout.look(now_ns, state)
+            sight = self._lookout.look(now_ns, state, self.memory.known_line)
         except Exception as error:
             # Whatever fails in looking is as good as blind: a task that needs no eyes goes on without them.
             self._eyes_view = replace(self._eyes_view, failure=f"looking fails ({type(error).__name__}: {error})")

@@ -50,6 +50,7 @@ class VisionSettings:
 
     # Conductors (vision.conductors.find_conductors).
     max_conductor_width_share: float = 0.03
+    max_conductor_width_px: float = math.inf  # where the distance is known
     pair_max_turn_rad: float = math.radians(2.5)
     min_coherence: float = 0.6
     min_contrast: float = 8.0  # grey levels
@@ -119,7 +120,7 @@ class LineFinder:
         conductors = find_conductors(
             edges,
             grey,
-            settings.max_conductor_width_share * diagonal_px,
+            min(settings.max_conductor_width_px, settings.max_conductor_width_share * diagonal_px),
             settings.pair_max_turn_rad,
             settings.min_coherence,
         )

@@ -88,7 +88,7 @@ def fly_virtually(
         eyes = RenderedEyes(
             autopilot,
             renderer.render,
-            vision_settings(plan.vision, camera),
+            vision_settings(plan, camera),
             plan.camera.rate_hz,
             plan.vision.log_rate_hz,
         )

@@ -13,7 +13,7 @@ from mission.guidance import (
     turn_towards_rad,
     wrap_angle_rad,
 )
-from mission.tasks.task import Observation, Step
+from mission.tasks.task import FlightMemory, Observation, Step
 
 _WRONG_WAY_RAD = math.radians(30.0)
 """A line this little off the wanted side is taken as ahead, not turned to the long way round."""
@@ -27,11 +27,16 @@ class AlignTask:
     progress = 0.0
 
     def __init__(
-        self, turn: Literal["nearest", "right", "left"], n_detections: int, guidance: GuidanceSettings
+        self,
+        turn: Literal["nearest", "right", "left"],
+        n_detections: int,
+        guidance: GuidanceSettings,
+        memory: FlightMemory,
     ) -> None:
         self._turn = turn
         self._n_detections = n_detections
         self._guidance = guidance
+        self._memory = memory
         self._target_rad: float | None = None
         self._line: WorldLine | None = None
         self._n_in_a_row = 0
@@ -63,7 +68,9 @@ class AlignTask:
             self._target_rad = self._choose(heading_rad, sight.yaw_at_capture_rad)
         else:
             self._target_rad = nearest_heading_rad(heading_rad, self._target_rad)
-        self._line = sight.line if sight.is_whole else self._line
+        if sight.is_whole:
+            self._line = sight.line
+            self._memory.known_line.begin(sight.line, sight.t_capture_ns)
         error_rad = wrap_angle_rad(self._target_rad - sight.yaw_at_capture_rad)
         self._n_in_a_row = self._n_in_a_row + 1 if abs(error_rad) < self._guidance.epsilon_rad else 0
 

@@ -1,5 +1,6 @@
 """Follow the line: [Ceron] Algorithm 6.3, and its centred variant."""
 
+import math
 from dataclasses import replace
 
 from mission.autopilot import Setpoint
@@ -10,28 +11,37 @@ from mission.guidance import (
     step_along,
     step_sideways,
     turn_towards_rad,
+    wrap_angle_rad,
 )
 from mission.tasks.odometer import NEARLY_M, Odometer
-from mission.tasks.task import Observation, Step, is_there
+from mission.tasks.task import FlightMemory, Observation, Sight, Step, is_there
+
+_SLOWEST = 0.25  # of r
+_STRAIGHT_RAD = math.radians(5.0)  # a turn that is left and takes no speed away
+_TURN_RAD = math.radians(25.0)  # and over which it does
+_PICK_UP_S = 1.5
 
 
 class FollowLinesTask:
     """Moves the setpoint along its own yaw at r, and turns that yaw by P times the image angle.
 
     The centred law also moves it sideways, onto the line: yaw alone keeps the direction but not the place, and an error
-    of one degree is 0.7 m after 40 m.
+    of one degree is 0.7 m after 40 m. Where wind has carried the vehicle aside, the setpoint goes beyond the line, so
+    that the autopilot brings it back sooner. It goes slower while the frames do not show the line, and while it turns.
     """
 
     needs_line = True
     needs_vision = True
 
-    def __init__(self, distance_m: float, guidance: GuidanceSettings) -> None:
+    def __init__(self, distance_m: float, guidance: GuidanceSettings, memory: FlightMemory) -> None:
         self._distance_m = distance_m
         self._guidance = guidance
+        self._memory = memory
         self._odometer = Odometer()
         self._target_rad: float | None = None
         self._line: WorldLine | None = None
         self._unseen_s = 0.0
+        self._pace = 1.0
 
     @property
     def progress(self) -> float:
@@ -43,24 +53,47 @@ class FollowLinesTask:
         guidance = self._guidance
         self._unseen_s += seen.dt_s
         if seen.sight is not None and seen.sight.line is not None:
-            heading_rad = reference.yaw_rad if self._target_rad is None else self._target_rad
-            self._target_rad = nearest_heading_rad(seen.sight.line.heading_rad, heading_rad)
-            self._line = seen.sight.line if seen.sight.is_whole else self._line
-            self._unseen_s = 0.0
+            self._see(reference, seen.sight, seen.sight.line)
         setpoint = reference
+        turn_rad = 0.0
         if self._target_rad is not None:
+            turn_rad = wrap_angle_rad(self._target_rad - reference.yaw_rad)
             yaw_rad = turn_towards_rad(
                 reference.yaw_rad, self._target_rad, guidance.P_per_s, guidance.yaw_rate_rad_s, seen.dt_s
             )
             setpoint = replace(reference, yaw_rad=yaw_rad)
         is_blind = self._unseen_s > guidance.max_estimate_age_s  # then wait for the line, or for the line_lost event
         left_m = self._distance_m - self._odometer.update(reference, reference.yaw_rad)
-        step_m = 0.0 if is_blind else min(guidance.r_m_s * seen.dt_s, max(0.0, left_m))
+        speed_m_s = guidance.r_m_s * self._wanted_pace(turn_rad, seen.dt_s) if guidance.is_centred else guidance.r_m_s
+        step_m = 0.0 if is_blind else min(speed_m_s * seen.dt_s, max(0.0, left_m))
         setpoint = step_along(setpoint, setpoint.yaw_rad, step_m)
         if guidance.is_centred and self._line is not None:
+            vehicle_off_m = self._line.offset_m(seen.state.north_m, seen.state.east_m, setpoint.yaw_rad)
             setpoint = step_sideways(
-                setpoint, self._line, setpoint.yaw_rad, guidance.lateral_per_s, guidance.lateral_max_m_s, seen.dt_s
+                setpoint,
+                self._line,
+                setpoint.yaw_rad,
+                guidance.lateral_per_s,
+                guidance.lateral_max_m_s,
+                seen.dt_s,
+                beyond_m=guidance.lateral_lead * vehicle_off_m,
             )
         if left_m <= NEARLY_M and is_there(seen.state, setpoint, guidance.arrival_m):
             return Step(setpoint, done=f"followed the line for {self._distance_m:g} m")
         return Step(setpoint)
+
+    def _see(self, reference: Setpoint, sight: Sight, line: WorldLine) -> None:
+        heading_rad = reference.yaw_rad if self._target_rad is None else self._target_rad
+        self._target_rad = nearest_heading_rad(line.heading_rad, heading_rad)
+        if sight.is_whole:
+            self._line = line
+            self._memory.known_line.begin(line, sight.t_capture_ns)
+        self._unseen_s = 0.0
+
+    def _wanted_pace(self, turn_rad: float, dt_s: float) -> float:
+        """The share of r to fly at: less while the line is not seen, and while there is still a way to turn."""
+        unseen = self._unseen_s / self._guidance.max_estimate_age_s
+        goal = max(_SLOWEST, min(1.0 - unseen, 1.0 - (abs(turn_rad) - _STRAIGHT_RAD) / _TURN_RAD))
+        # Slower at once, faster again over a second or so.
+        self._pace = min(goal, self._pace + dt_s / _PICK_UP_S)
+        return min(1.0, self._pace)

@@ -3,16 +3,21 @@
 import math
 
 from mission.autopilot import Setpoint
-from mission.guidance import GuidanceSettings, step_along
+from mission.guidance import GuidanceSettings, WorldLine, step_along
+from mission.parallax import Parallax
 from mission.tasks.odometer import NEARLY_M, Odometer
-from mission.tasks.task import FlightMemory, Observation, Step, is_there
+from mission.tasks.task import FlightMemory, Observation, Sight, Step, is_there
+
+_SAME_LINE_M = 1.0
+"""A line that seems to jump further from one sight to the next is another one."""
 
 
 class MoveUntilTask:
     """Flies along theta_0 until n frames in a row show the line.
 
     The thesis stops there. By default we go on until the line is right below, because a vehicle beside the line would
-    follow it from the side, and the way home, which is as long as the way here, would miss the take-off point.
+    follow it from the side, and the way home, which is as long as the way here, would miss the take-off point. And we
+    go on over what lies on the ground, which may look like a line: it passes below more slowly than conductors do.
     """
 
     needs_line = False
@@ -36,6 +41,10 @@ class MoveUntilTask:
         self._n_in_a_row = 0
         self._blind_s = 0.0
         self._goal_m: float | None = None
+        self._seen_m: float | None = None
+        self._parallax = Parallax(guidance.height_over_line_m)
+        self._is_sure = False
+        memory.known_line.forget()
 
     @property
     def progress(self) -> float:
@@ -80,17 +89,41 @@ class MoveUntilTask:
         sight = seen.sight
         if sight is None:
             return
-        if sight.line is None:
-            self._n_in_a_row = 0
+        if sight.line is None or not self._may_be_it(sight, sight.line, heading_rad):
+            self._n_in_a_row, self._goal_m = 0, self._goal_m if self._is_overhead and self._is_sure else None
             return
         self._n_in_a_row += 1
         if self._n_in_a_row < self._n_detections:
             return
-        crossing_m = sight.line.crossing_m(reference.north_m, reference.east_m, heading_rad)
-        if not self._is_overhead or crossing_m is None:
+        if not self._is_overhead:
             if self._goal_m is None:  # where the vehicle is: the setpoint runs ahead of it
                 lag_north_m, lag_east_m = seen.state.north_m - reference.north_m, seen.state.east_m - reference.east_m
                 lag_m = lag_north_m * math.cos(heading_rad) + lag_east_m * math.sin(heading_rad)
                 self._goal_m = self._odometer.moved_m + min(0.0, lag_m)
-        elif sight.is_whole or self._goal_m is None:
+            return
+        crossing_m = sight.line.crossing_m(reference.north_m, reference.east_m, heading_rad)
+        if crossing_m is not None and self._is_sure and (sight.is_whole or self._goal_m is None):
             self._goal_m = min(self._odometer.moved_m + crossing_m, self._max_distance_m)
+
+    def _may_be_it(self, sight: Sight, line: WorldLine, heading_rad: float) -> bool:
+        """Whether the line in sight may be the one to stop over: it crosses the way, high above the ground.
+
+        How high is told by its parallax, which takes some way; until then the vehicle goes on, and may pass the line.
+        """
+        if not self._is_overhead:
+            return True
+        seen_m = line.crossing_m(sight.north_m, sight.east_m, heading_rad)
+        if seen_m is None:
+            return False
+        if self._seen_m is not None and abs(seen_m - self._seen_m) > _SAME_LINE_M:
+            self._parallax = Parallax(self._guidance.height_over_line_m)
+            self._is_sure = False
+        self._seen_m = seen_m
+        way_m = sight.north_m * math.cos(heading_rad) + sight.east_m * math.sin(heading_rad)
+        self._parallax.add(way_m, seen_m)
+        height_m = self._parallax.height_m
+        if height_m is None:
+            return True
+        altitude_m = self._memory.start.down_m - sight.down_m
+        self._is_sure = height_m < math.sqrt(self._guidance.height_over_line_m * max(altitude_m, 0.1))
+        return self._is_sure

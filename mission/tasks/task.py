@@ -10,6 +10,7 @@ from typing import Protocol
 
 from mission.autopilot import FlightMode, Setpoint, VehicleState
 from mission.guidance import WorldLine
+from mission.known_line import KnownLine
 from mission.trail import Trail
 from vision.records import LineEstimate
 
@@ -19,7 +20,8 @@ class Sight:
     """What one frame showed: None for `estimate` and `line` where it showed no line.
 
     `line` is the estimate put on the map with the vehicle's pose at the time of capture. Its heading always counts; its
-    place only where `is_whole`: when the frame showed all of the line's conductors, as far as known.
+    place only where `is_whole`: when the frame showed all of the line's conductors, as far as known. The vehicle was at
+    `north_m`, `east_m`, `down_m` then.
     """
 
     t_capture_ns: int
@@ -27,6 +29,9 @@ class Sight:
     estimate: LineEstimate | None
     line: WorldLine | None
     is_whole: bool
+    north_m: float = 0.0
+    east_m: float = 0.0
+    down_m: float = 0.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,7 +49,7 @@ class FlightMemory:
 
     `start` is where the vehicle stood when the mission began, `pad` where a resumed mission takes off again (None: at
     the start); `move_until_m` is how far from the start, along theta_0, the last move_until ended. `trail` is the way
-    flown, and `line_seen_at` the place where the line was last seen.
+    flown, `line_seen_at` the place where the line was last seen, and `known_line` the line that is followed.
     """
 
     start: Setpoint
@@ -53,6 +58,7 @@ class FlightMemory:
     pad: Setpoint | None = None
     trail: Trail = field(default_factory=Trail)
     line_seen_at: Setpoint | None = None
+    known_line: KnownLine = field(default_factory=KnownLine)
 
 
 class Command(enum.Enum):

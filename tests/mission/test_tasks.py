@@ -26,9 +26,9 @@ def state_at(setpoint: Setpoint, **changes: object) -> VehicleState:
     return replace(state, **changes)  # type: ignore[arg-type]
 
 
-def sight(line: WorldLine | None, yaw_rad: float = 0.0, *, is_whole: bool = True) -> Sight:
+def sight(line: WorldLine | None, yaw_rad: float = 0.0, *, is_whole: bool = True, at: Setpoint = UP) -> Sight:
     estimate = None if line is None else LineEstimate(0.0, 0.0, 3, None, 1.0, 0)
-    return Sight(0, yaw_rad, estimate, line, is_whole)
+    return Sight(0, yaw_rad, estimate, line, is_whole, at.north_m, at.east_m, at.down_m)
 
 
 def fly_perfectly(
@@ -37,7 +37,9 @@ def fly_perfectly(
     """Step a task with a vehicle that follows at once; the last step, the last setpoint, and the time it took [s]."""
     dt_s = 1.0 / rate_hz
     for tick in range(round(limit_s * rate_hz)):
-        step = task.step(reference, Observation(dt_s, state_at(reference), sight(line, reference.yaw_rad)))
+        step = task.step(
+            reference, Observation(dt_s, state_at(reference), sight(line, reference.yaw_rad, at=reference))
+        )
         reference = step.setpoint or reference
         if step.done or step.failed:
             return step, reference, tick * dt_s
