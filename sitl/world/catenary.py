@@ -1,4 +1,4 @@
-"""The curve in which a conductor hangs between two supports: a true catenary, found from its sag."""
+"""The curve in which a conductor hangs between two supports: a true catenary."""
 
 import math
 
@@ -43,15 +43,28 @@ def catenary_parameter_m(span_m: float, rise_m: float, sag_m: float) -> float:
 def hang(
     start_ned_m: tuple[float, float, float], end_ned_m: tuple[float, float, float], sag_m: float, step_m: float
 ) -> NDArray[np.float64]:
-    """Sample the catenary between two supports.
+    """Sample the catenary that hangs `sag_m` [m] below its chord at mid-span.
+
+    Takes and returns what hang_at does. Raises ValueError as catenary_parameter_m does.
+    """
+    span_m, rise_m = _span_and_rise_m(start_ned_m, end_ned_m)
+    return hang_at(start_ned_m, end_ned_m, catenary_parameter_m(span_m, rise_m, sag_m), step_m)
+
+
+def hang_at(
+    start_ned_m: tuple[float, float, float], end_ned_m: tuple[float, float, float], parameter_m: float, step_m: float
+) -> NDArray[np.float64]:
+    """Sample the catenary of the parameter a [m] between two supports.
 
     `start_ned_m` and `end_ned_m` are NED [m]; the samples stand at most `step_m` [m] apart on the ground. Returns
-    (n, 3) float64 [m] NED whose first and last rows are the supports. Raises ValueError as catenary_parameter_m does.
+    (n, 3) float64 [m] NED whose first and last rows are the supports. Raises ValueError for a parameter so small that
+    the wire would be more than a hundred spans long.
     """
     start, end = np.asarray(start_ned_m, dtype=np.float64), np.asarray(end_ned_m, dtype=np.float64)
-    span_m = math.hypot(end[0] - start[0], end[1] - start[1])
-    rise_m = float(start[2] - end[2])
-    a = catenary_parameter_m(span_m, rise_m, sag_m)
+    a = parameter_m
+    span_m, rise_m = _span_and_rise_m(start_ned_m, end_ned_m)
+    if not a * 14.0 > span_m > 0.0:
+        raise ValueError(f"Nothing hangs over a span of {span_m} m with the parameter {a} m.")
     u = math.asinh(rise_m / (2.0 * a * math.sinh(span_m / (2.0 * a))))
     lowest_m = span_m / 2.0 - a * u
 
@@ -62,3 +75,7 @@ def hang(
     points[:, 2] = start[2] - 2.0 * a * np.sinh((p + q) / 2.0) * np.sinh((p - q) / 2.0)
     points[-1] = end
     return points
+
+
+def _span_and_rise_m(start: tuple[float, float, float], end: tuple[float, float, float]) -> tuple[float, float]:
+    return math.hypot(end[0] - start[0], end[1] - start[1]), start[2] - end[2]
