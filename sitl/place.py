@@ -22,6 +22,13 @@ class Origin:
         longitude_rad = self.longitude_rad + position_m[1] / (EARTH_RADIUS_M * math.cos(self.latitude_rad))
         return (latitude_rad, longitude_rad, self.altitude_m - position_m[2])
 
+    def place_ne_m(self, latitude_rad: float, longitude_rad: float) -> tuple[float, float]:
+        """Where a place on Earth lies, north and east [m]: global_of, the other way round."""
+        return (
+            (latitude_rad - self.latitude_rad) * EARTH_RADIUS_M,
+            (longitude_rad - self.longitude_rad) * EARTH_RADIUS_M * math.cos(self.latitude_rad),
+        )
+
 
 @dataclass(frozen=True, slots=True)
 class Home:

@@ -15,29 +15,33 @@ def catenary_parameter_m(span_m: float, rise_m: float, sag_m: float) -> float:
     is measured vertically from the middle of the chord, as line engineers do. Raises ValueError unless
     0 < sag_m <= span_m and span_m > 0.
 
-    With s = span / 2a and u = asinh(rise / (2 a sinh s)) the mid-span sag is a cosh(u) (cosh(s) - 1), which grows with
-    s; s is bisected.
+    The sag grows with s = span / 2a; s is bisected.
     """
     if not span_m > 0.0:
         raise ValueError(f"A span must be longer than 0 m, not {span_m} m.")
     if not 0.0 < sag_m <= span_m:
         raise ValueError(f"The sag must lie above 0 m and not above the span of {span_m} m, not at {sag_m} m.")
 
-    def sag_at(s: float) -> float:
-        a = span_m / (2.0 * s)
-        # cosh(s) - 1 cancels for the flat curves of real lines; 2 sinh(s/2)^2 is the same without the loss.
-        return a * math.hypot(1.0, rise_m / (2.0 * a * math.sinh(s))) * 2.0 * math.sinh(s / 2.0) ** 2
-
     low, high = 0.0, 4.0
-    while sag_at(high) < sag_m:
+    while sag_m_of(span_m / (2.0 * high), span_m, rise_m) < sag_m:
         high *= 2.0
     for _ in range(_N_BISECTIONS):
         middle = 0.5 * (low + high)
-        if sag_at(middle) < sag_m:
+        if sag_m_of(span_m / (2.0 * middle), span_m, rise_m) < sag_m:
             low = middle
         else:
             high = middle
     return span_m / (low + high)
+
+
+def sag_m_of(parameter_m: float, span_m: float, rise_m: float) -> float:
+    """The sag [m] at mid-span below the chord, of the catenary with the parameter a [m].
+
+    With s = span / 2a and u = asinh(rise / (2 a sinh s)) it is a cosh(u) (cosh(s) - 1).
+    """
+    s = span_m / (2.0 * parameter_m)
+    # cosh(s) - 1 cancels for the flat curves of real lines; 2 sinh(s/2)^2 is the same without the loss.
+    return parameter_m * math.hypot(1.0, rise_m / (2.0 * parameter_m * math.sinh(s))) * 2.0 * math.sinh(s / 2.0) ** 2
 
 
 def hang(

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from sitl.world.catenary import hang, hang_at
+from sitl.world.catenary import hang, hang_at, sag_m_of
 from sitl.world.errors import WrongKey
 from sitl.world.line_models import HangModel
 from sitl.world.records import Conductor, Member, PointNed
@@ -93,6 +93,19 @@ def string_conductor(
         points = np.concatenate([pieces[0], *(piece[1:] for piece in pieces[1:])])
         conductors.append(Conductor(diameter_m, points, is_shield))
     return conductors
+
+
+def sags_m(stands: Sequence[Stand], line_runs: Sequence[Run], hung: HangModel) -> list[float]:
+    """The sag of each span that is there [m]."""
+    if hung.sag_m is not None:
+        return [hung.sag_m]
+    sags = []
+    for run in line_runs:
+        for k, parameter_m in _parameters_m(stands, run, hung).items():
+            here, there = stands[k], stands[k + 1]
+            span_m = math.dist(here.place_ne_m, there.place_ne_m)
+            sags.append(sag_m_of(parameter_m, span_m, there.up_m - here.up_m))
+    return sags
 
 
 def bundle_offsets(n_bundle: int, spacing_m: float) -> list[tuple[float, float]]:

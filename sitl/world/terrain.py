@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 
 from sitl.place import Origin
+from sitl.world.errors import WrongKey
 from sitl.world.height_grid import HeightGrid
 from sitl.world.height_map import read_height_map
 from sitl.world.models import FlatModel, HeightMapModel, HillsModel
@@ -14,6 +15,7 @@ from sitl.world.records import PointNe
 
 MARGIN_M = 100.0
 _CELL_M = 4.0
+_WIDEST_M = 12_000.0
 _N_WAVES = 14
 
 
@@ -22,10 +24,13 @@ def build_terrain(
 ) -> HeightGrid:
     """The terrain over all `places` that things stand at, the start, and a margin.
 
-    `folder` is the world file's. Raises WrongKey for a height map that cannot be read or does not reach so far.
+    `folder` is the world file's. Raises WrongKey for a world too wide, and for a height map that cannot be read or
+    does not reach so far.
     """
     norths, easts = zip((0.0, 0.0), *places, strict=True)
     bounds = (min(norths) - MARGIN_M, min(easts) - MARGIN_M, max(norths) + MARGIN_M, max(easts) + MARGIN_M)
+    if max(bounds[2] - bounds[0], bounds[3] - bounds[1]) > _WIDEST_M:
+        raise WrongKey("lines", f"the world is more than {_WIDEST_M / 1000:g} km wide; leave out what is far away")
     flat = HeightGrid.flat(*bounds, _CELL_M)
     if isinstance(model, FlatModel):
         return flat
