@@ -28,7 +28,7 @@ from sitl.pose import Pose, PoseBlock
 from sitl.render.map import render_map
 from sitl.server import AutopilotName, SitlSettings, SitlSummary, run
 from sitl.setup import SETUP
-from sitl.world.file import WorldError, load_world
+from sitl.world.file import DEFAULT_WORLD, WorldError, load_world
 from sitl.world.records import World
 
 __all__ = [
@@ -63,7 +63,7 @@ class Simulation:
         self._poses = PoseBlock.create()
         self._stop = multiprocessing.get_context("spawn").Event()
         self._summaries, self._child_summaries = multiprocessing.get_context("spawn").Pipe(duplex=False)
-        settings = sitl_settings(self.world, clock, self._port, seed, wind_m_s, self._poses.name)
+        settings = sitl_settings(self.world, clock, self._port, seed, wind_m_s, self._poses.name, world)
         self._process = multiprocessing.get_context("spawn").Process(
             target=_serve, args=(settings, self._stop, self._child_summaries), name="lineflight-sitl", daemon=True
         )
@@ -132,9 +132,15 @@ def sim_camera_opener(
 
 
 def sitl_settings(
-    world: World, clock: ScaledClock, port: int, seed: int, wind_m_s: float, pose_block: str | None
+    world: World,
+    clock: ScaledClock,
+    port: int,
+    seed: int,
+    wind_m_s: float,
+    pose_block: str | None,
+    name: str | None = None,
 ) -> SitlSettings:
-    """The simulated vehicle of a world."""
+    """The simulated vehicle of a world; `name` is what the world was loaded by (None: the default one)."""
     return SitlSettings(
         port=port,
         seed=seed,
@@ -144,6 +150,7 @@ def sitl_settings(
         origin=world.origin,
         pose_block=pose_block,
         parameters=tuple(SETUP.items()),
+        world=name or DEFAULT_WORLD,
     )
 
 
@@ -186,7 +193,7 @@ def serve_until_stopped(
     for signal_number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(signal_number, lambda _number, _frame: stop.set())
     clock = ScaledClock(speed, ScaledClock().now_ns())
-    settings = sitl_settings(load_world(world), clock, port, seed, wind_m_s, None)
+    settings = sitl_settings(load_world(world), clock, port, seed, wind_m_s, None, world)
     return run(replace(settings, autopilot=autopilot), stop.is_set)
 
 
