@@ -240,7 +240,7 @@ class SimAutopilot:
         has_let_go = self._land_detector.has_let_go
         torque = self._control.step(dt_s, self._navigator.task, self.estimate, vehicle.height_m, has_let_go=has_let_go)
         airspeed_m_s = math.dist(vehicle.velocity_m_s, self._air_m_s)
-        self._air_m_s = self.wind.step(dt_s, vehicle.height_m, airspeed_m_s)
+        self._air_m_s = self.wind.step(dt_s, vehicle.height_m, airspeed_m_s, vehicle.position_m)
         vehicle.step(dt_s, self.thrust, torque, self._air_m_s)
         self._look_for_contact()
         self.battery.step(dt_s, vehicle.power_w)
@@ -249,7 +249,9 @@ class SimAutopilot:
         if drain_s > 0 and commander.is_armed:
             least = self.parameters.get("SIM_BAT_MIN_PCT") / 100
             self.battery.drain(dt_s, empty_after_s=drain_s, least=least)
-        self.estimate = self._estimator.step(dt_s, vehicle, has_gps=self._positioning.has_gps)
+        self.estimate = self._estimator.step(
+            dt_s, vehicle, has_gps=self._positioning.has_gps, airspeed_m_s=airspeed_m_s
+        )
         if self._positioning.has_gps:
             self.last_fix_m = self.estimate.position_m
         self._detect_landing(dt_s)

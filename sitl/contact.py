@@ -50,6 +50,9 @@ class Clearance:
         return THINGS[least], distances[least]
 
 
+_NOTHING_NEAR = Clearance(math.inf, math.inf, math.inf, math.inf)
+
+
 class Obstacles:
     """What stands in a world: conductors and members as round bars, crowns as solids of revolution, houses as prisms.
 
@@ -99,9 +102,12 @@ class Obstacles:
         self._solid_kinds = np.array([kind for _, _, kind in shapes], dtype=np.int8)
         self._corners = np.array(corners, dtype=np.float64).reshape(-1, 2)
         self._sort()
+        self.clearance((0.0, 0.0, 0.0))  # compiled before the flight
 
     def clearance(self, position_ned_m: PointNed, reach_m: float = REACH_M) -> Clearance:
         """How far the point is from each kind of thing [m]; what is farther than `reach_m` is not seen."""
+        if len(self._items) == 0:
+            return _NOTHING_NEAR
         north_m, east_m, down_m = position_ned_m
         return Clearance(
             *nearest_m(

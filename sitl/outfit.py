@@ -5,6 +5,8 @@ from collections.abc import Mapping
 from sitl.airframes import airframe_of
 from sitl.autopilot import SimAutopilot
 from sitl.contact import Obstacles
+from sitl.gust_front import GustFronts
+from sitl.lee import Lee
 from sitl.parameters import Parameters
 from sitl.place import Origin
 from sitl.setup import SETUP
@@ -14,6 +16,7 @@ from sitl.witness import Witness
 from sitl.world.height_grid import HeightGrid
 from sitl.world.light import LIGHTS
 from sitl.world.records import Ground, World
+from sitl.world.surface import surface_of
 
 
 def outfit(
@@ -37,9 +40,13 @@ def outfit(
     over PX4's defaults; `speed` is how many times faster than the wall clock it will be stepped.
     Raises AirframeError, KeyError and TypeError for a wrong parameter, ValueError for a wind below 0.
     """
+    wind = Wind(wind_m_s, seed, wind_from_rad, fronts=GustFronts(seed) if gust_fronts else None)
+    surface = surface_of(world)
+    if wind_m_s > 0.0 and surface is not world.terrain:
+        wind.lee = Lee(surface, world.terrain, wind.from_rad, wind.roughness_m)
     return SimAutopilot(
         Vehicle(airframe_of(airframe), yaw_rad=world.start_yaw_rad, ground=ground_of(world.terrain)),
-        Wind(wind_m_s, seed, wind_from_rad),
+        wind,
         seed=seed,
         parameters=Parameters(dict(parameters)),
         origin=world.origin,
