@@ -7,9 +7,9 @@ How much less: Perera's law for wind-breaks (J. Wind Eng. Ind. Aerodyn. 8, 1981)
     eta = z / h * (0.32 / ln(h / z0) * x / h)^-0.47
 
 It holds from five heights on; nearer, the value there is taken. Behind a row of trees that is half of the wind at five
-heights, a sixth at fifteen, and next to nothing above two and a half, as Heisler and DeWalle (Agric. Ecosyst. Environ. 22/23,
-1988) collect it. By their figures the turbulence in the wake is up to half as strong again; here it grows with what
-the mean wind loses.
+heights, a sixth at fifteen, and next to nothing above two and a half, as Heisler and DeWalle collect it (Agric.
+Ecosyst. Environ. 22/23, 1988). By their figures the turbulence in the wake is up to half as strong again; here it grows
+with what the mean wind loses.
 """
 
 import math
@@ -48,7 +48,7 @@ def reduction_behind(x_m: float, z_m: float, break_m: float, roughness_m: float)
 
 @njit(nogil=True, cache=True)  # type: ignore[untyped-decorator]
 def height_at(up_m: NDArray[np.float32], grid: tuple[float, float, float], north_m: float, east_m: float) -> float:
-    """A grid's height [m] at a place by interpolation, beyond its edges that of the edge; `grid` is south, west, cell."""
+    """A grid's height [m] at a place by interpolation, beyond the edges that of the edge; `grid`: south, west, cell."""
     rows, columns = up_m.shape
     row = min(max((north_m - grid[0]) / grid[2], 0.0), rows - 1.0)
     column = min(max((east_m - grid[1]) / grid[2], 0.0), columns - 1.0)
@@ -56,7 +56,8 @@ def height_at(up_m: NDArray[np.float32], grid: tuple[float, float, float], north
     a, b = row - i, column - j
     south: float = (1.0 - b) * up_m[i, j] + b * up_m[i, j + 1]
     north: float = (1.0 - b) * up_m[i + 1, j] + b * up_m[i + 1, j + 1]
-    return (1.0 - a) * south + a * north
+    height_m: float = (1.0 - a) * south + a * north
+    return height_m
 
 
 @njit(nogil=True, cache=True)  # type: ignore[untyped-decorator]
