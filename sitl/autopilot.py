@@ -23,6 +23,7 @@ from sitl.preflight import Preflight
 from sitl.takeoff_landing import LandDetector, Ramp
 from sitl.vehicle import Vector, Vehicle, euler_of
 from sitl.wind import Wind
+from sitl.witness import Witness
 
 _HOME_S = 1.14  # after boot: the first home
 _MIN_SATELLITES = 4  # for a fix
@@ -47,17 +48,20 @@ class SimAutopilot:
         speed: float = 1.0,
         is_noisy: bool = True,
         uid: int = DEFAULT_UID,
+        witness: Witness | None = None,
     ) -> None:
         """Boot. `speed` is how many times faster than the wall clock it will be stepped (see Commander).
 
         `uid` is the hardware's number, 64 bits (AUTOPILOT_VERSION): another one is another vehicle.
+        `witness` watches what the vehicle comes near to, and touches; without one nothing stands in its way.
         """
         self.uid = uid
+        self.witness = witness
         self.vehicle = vehicle or Vehicle()
         self.wind = wind or Wind(0.0, seed)
         self.parameters = parameters or Parameters()
         self.origin = origin or Origin()
-        self.battery = Battery()
+        self.battery = Battery(self.vehicle.airframe.pack)
         self.boot_s = 0.0
         self.commander = Commander(self.parameters, self.say, speed=speed)
         self._estimator = Estimator(seed, is_noisy=is_noisy)
@@ -236,19 +240,34 @@ class SimAutopilot:
         has_let_go = self._land_detector.has_let_go
         torque = self._control.step(dt_s, self._navigator.task, self.estimate, vehicle.height_m, has_let_go=has_let_go)
         airspeed_m_s = math.dist(vehicle.velocity_m_s, self._air_m_s)
-        self._air_m_s = self.wind.step(dt_s, vehicle.height_m, airspeed_m_s)
+        self._air_m_s = self.wind.step(dt_s, vehicle.height_m, airspeed_m_s, vehicle.position_m)
         vehicle.step(dt_s, self.thrust, torque, self._air_m_s)
+        self._look_for_contact()
         self.battery.step(dt_s, vehicle.power_w)
+        vehicle.supply = self.battery.thrust_share
         drain_s = self.parameters.get("SIM_BAT_DRAIN")
         if drain_s > 0 and commander.is_armed:
             least = self.parameters.get("SIM_BAT_MIN_PCT") / 100
             self.battery.drain(dt_s, empty_after_s=drain_s, least=least)
-        self.estimate = self._estimator.step(dt_s, vehicle, has_gps=self._positioning.has_gps)
+        self.estimate = self._estimator.step(
+            dt_s, vehicle, has_gps=self._positioning.has_gps, airspeed_m_s=airspeed_m_s
+        )
         if self._positioning.has_gps:
             self.last_fix_m = self.estimate.position_m
         self._detect_landing(dt_s)
         if self.home is None and self.boot_s >= _HOME_S and self.has_gps:
             self._set_home()
+
+    def _look_for_contact(self) -> None:
+        """What touches something breaks; once it lies still, its power is cut, as by whoever picks it up."""
+        if self.witness is None:
+            return
+        vehicle = self.vehicle
+        if vehicle.is_broken:
+            if vehicle.is_on_ground and self.is_armed:
+                self.commander.disarm(is_forced=True)
+        elif self.witness.look(self.boot_s, vehicle) is not None:
+            vehicle.crash()
 
     def _rest_sticks(self) -> None:
         """From a change of mode on, a stick counts as moved from where it is then."""

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 # Open-circuit voltage of a LiPo cell at 0, 10 ... 100 % of its charge [V].
 _CELL_V = (3.30, 3.60, 3.69, 3.73, 3.77, 3.80, 3.85, 3.92, 4.00, 4.08, 4.20)
-
+_NOMINAL_CELL_V = 3.7
 
 _FAILURE_S = 1.0  # a failed pack's charge falls with this time constant, as PX4's simulator was recorded
 
@@ -23,6 +23,11 @@ class Pack:
     def energy_j(self) -> float:
         """Energy of the full pack [J]."""
         return self.capacity_ah * 3600 * self.n_cells * sum(_CELL_V) / len(_CELL_V)
+
+    @property
+    def nominal_v(self) -> float:
+        """The voltage that the pack is sold by, and at which motors' thrust is stated [V]."""
+        return _NOMINAL_CELL_V * self.n_cells
 
 
 class Battery:
@@ -45,6 +50,16 @@ class Battery:
         place = min(max(self.remaining, 0.0), 1.0) * (len(_CELL_V) - 1)
         low = min(int(place), len(_CELL_V) - 2)
         return self.pack.n_cells * (_CELL_V[low] + (place - low) * (_CELL_V[low + 1] - _CELL_V[low]))
+
+    @property
+    def thrust_share(self) -> float:
+        """How much of the full thrust the voltage under load leaves, 0 to 1.
+
+        A motor's speed goes with the voltage, and thrust with its square. More than the nominal voltage is not made use
+        of: that is the autopilot's full thrust.
+        """
+        share = max(self.voltage_v, 0.0) / self.pack.nominal_v
+        return min(1.0, share * share)
 
     def step(self, dt_s: float, motor_power_w: float) -> None:
         """Draw `motor_power_w` and the base load for `dt_s`; the voltage sags by the current in the resistance."""

@@ -7,14 +7,15 @@ from typing import Literal
 
 from drivers.clock import NS_PER_S, ScaledClock
 from sitl.arducopter import ArduCopterFace
-from sitl.autopilot import SimAutopilot
+from sitl.contact import Obstacles
 from sitl.mavlink import MavlinkFace
-from sitl.parameters import Parameters
+from sitl.outfit import open_field, outfit
 from sitl.place import Origin
 from sitl.pose import Pose, PoseBlock
 from sitl.udp import UdpLink
 from sitl.vehicle import Vehicle
-from sitl.wind import Wind
+from sitl.witness import Testimony, Witness
+from sitl.world.file import load_world
 
 AutopilotName = Literal["px4", "arducopter"]
 _FACES: dict[AutopilotName, type[MavlinkFace]] = {"px4": MavlinkFace, "arducopter": ArduCopterFace}
@@ -31,7 +32,9 @@ class SitlSettings:
     `port` is the application's UDP port; `wind_m_s` the mean wind at 20 ft, whose direction `seed` draws;
     `start_yaw_rad` the heading at start; `origin` places the world's NED frame, where the vehicle stands at start;
     `pose_block` names the shared memory that gets the true pose (None: nobody looks); `parameters` are set over PX4's
-    defaults; `autopilot` whose face it shows.
+    defaults; `autopilot` whose face it shows. `world` is the name or path of the world it flies in, which has its own
+    start and origin then (None: nothing stands around); `airframe` one of sitl.airframes; `wind_from_rad` where the
+    wind blows from, clockwise from north, instead of what `seed` draws; `gust_fronts` adds single gusts.
     """
 
     port: int
@@ -43,14 +46,19 @@ class SitlSettings:
     pose_block: str | None
     parameters: tuple[tuple[str, float | int], ...] = ()
     autopilot: AutopilotName = "px4"
+    world: str | None = None
+    airframe: str = "f550"
+    wind_from_rad: float | None = None
+    gust_fronts: bool = False
 
 
 @dataclass(frozen=True, slots=True)
 class SitlSummary:
-    """How much flight was simulated [s], in how much wall time [s], and so how fast."""
+    """How much flight was simulated [s], in how much wall time [s], and so how fast; and what it came near to."""
 
     simulated_s: float
     wall_s: float
+    testimony: Testimony | None = None
 
     @property
     def achieved_speed(self) -> float:
@@ -59,19 +67,28 @@ class SitlSummary:
 
 
 def run(settings: SitlSettings, should_stop: Callable[[], bool]) -> SitlSummary:
-    """Fly until `should_stop` says so. Raises OSError when the port is taken, FileNotFoundError without a pose block.
+    """Fly until `should_stop` says so.
+
+    Raises OSError when the port is taken, FileNotFoundError without a pose block, and what load_world and outfit raise.
 
     Steps 4 ms of flight time, paced by the clock. When late it catches up; debt beyond a quarter of a second of wall
     time is forgiven, and shows in the summary's speed.
     """
     clock = settings.clock
-    autopilot = SimAutopilot(
-        Vehicle(yaw_rad=settings.start_yaw_rad),
-        Wind(settings.wind_m_s, settings.seed),
+    world = (
+        open_field(settings.origin, settings.start_yaw_rad) if settings.world is None else load_world(settings.world)
+    )
+    witness = Witness(Obstacles(world))
+    autopilot = outfit(
+        world,
+        airframe=settings.airframe,
+        wind_m_s=settings.wind_m_s,
+        wind_from_rad=settings.wind_from_rad,
         seed=settings.seed,
-        parameters=Parameters(dict(settings.parameters)),
-        origin=settings.origin,
+        gust_fronts=settings.gust_fronts,
+        parameters=dict(settings.parameters),
         speed=max(1.0, clock.speed),
+        witness=witness,
     )
     pose_block = PoseBlock.attach(settings.pose_block) if settings.pose_block is not None else None
     forgive_ns = round(_FORGIVE_WALL_NS * clock.speed)
@@ -84,6 +101,7 @@ def run(settings: SitlSettings, should_stop: Callable[[], bool]) -> SitlSummary:
                 now_ns = clock.now_ns()
                 if now_ns - flight_ns > forgive_ns:
                     flight_ns = now_ns - forgive_ns
+                witness.began_ns = flight_ns - n_steps * _STEP_NS
                 for _ in range(min(_MAX_BURST, (now_ns - flight_ns) // _STEP_NS)):
                     autopilot.step(_STEP_S)
                     link.service()
@@ -94,7 +112,7 @@ def run(settings: SitlSettings, should_stop: Callable[[], bool]) -> SitlSummary:
                 ahead_ns = flight_ns + _STEP_NS - clock.now_ns()
                 if ahead_ns > 0:
                     time.sleep(clock.wall_s(ahead_ns / NS_PER_S))
-            return SitlSummary(n_steps * _STEP_S, time.monotonic() - began_s)
+            return SitlSummary(n_steps * _STEP_S, time.monotonic() - began_s, witness.summary)
     finally:
         if pose_block is not None:
             pose_block.close()

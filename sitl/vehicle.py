@@ -5,14 +5,18 @@ World NED, body FRD, quaternion (w, x, y, z) ned_from_frd. Plain floats: a step 
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 
-GRAVITY_M_S2 = 9.80665
+from sitl.airframes import GRAVITY_M_S2, Airframe
+
+__all__ = ["GRAVITY_M_S2", "Airframe", "GroundHeight", "Quaternion", "Vector", "Vehicle", "euler_of", "flat_ground"]
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 GroundHeight = Callable[[float, float], float]
 """(north, east) [m] -> down [m] of the ground."""
+
+_LEFT_SPEED = 0.2  # of the speed, after a crash
+_TUMBLE_RAD_S = (4.0, 3.0, 1.0)
 
 
 def flat_ground(north_m: float, east_m: float) -> float:
@@ -20,39 +24,12 @@ def flat_ground(north_m: float, east_m: float) -> float:
     return 0.0
 
 
-@dataclass(frozen=True, slots=True)
-class Airframe:
-    """What a multirotor is made of; the default is a hexacopter of the DJI F550's class, loaded with a camera.
-
-    `max_thrust_n` is all motors together; `max_torque_n_m` what they give about body x, y, z around hover. Drag against
-    the air is a = -(linear + quadratic * |v|) v: rotors give the linear part, frame and payload the quadratic one;
-    the linear part lies within what is measured on multirotors (0.2 to 0.55 1/s: Faessler et al., IEEE RA-L 2018), and
-    hovering in 8 m/s takes 24 degrees of tilt. `disk_area_m2` and `figure_of_merit` set the power that thrust costs
-    (momentum theory).
-    """
-
-    mass_kg: float = 2.4
-    inertia_kg_m2: Vector = (0.030, 0.030, 0.050)
-    max_thrust_n: float = 48.0
-    max_torque_n_m: Vector = (4.4, 4.4, 0.55)
-    motor_time_constant_s: float = 0.05
-    linear_drag_1_s: float = 0.45
-    quadratic_drag_1_m: float = 0.012
-    rotational_drag_n_m_s: Vector = (0.02, 0.02, 0.05)
-    disk_area_m2: float = 6 * math.pi * (0.239 / 2) ** 2
-    figure_of_merit: float = 0.42
-
-    @property
-    def hover_thrust(self) -> float:
-        """The part of the full thrust that hovers, 0 to 1."""
-        return self.mass_kg * GRAVITY_M_S2 / self.max_thrust_n
-
-
 class Vehicle:
     """The moving body. `step` is deterministic: the same inputs give the same motion.
 
     Attributes are the true state: position NED [m], velocity NED [m/s], acceleration NED [m/s2], `quaternion`
-    ned_from_frd, `rates_rad_s` body FRD, `thrust_n` now, `is_on_ground`.
+    ned_from_frd, `rates_rad_s` body FRD, `thrust_n` now, `is_on_ground`, `is_broken`. Set `supply`, the share of the
+    full thrust that the battery's voltage leaves (0 to 1).
     """
 
     __slots__ = (
@@ -60,10 +37,12 @@ class Vehicle:
         "acceleration_m_s2",
         "airframe",
         "ground",
+        "is_broken",
         "is_on_ground",
         "position_m",
         "quaternion",
         "rates_rad_s",
+        "supply",
         "thrust_n",
         "velocity_m_s",
     )
@@ -82,6 +61,8 @@ class Vehicle:
         self.thrust_n = 0.0
         self._torque_n_m: Vector = (0.0, 0.0, 0.0)
         self.is_on_ground = True
+        self.is_broken = False
+        self.supply = 1.0
 
     @property
     def euler_rad(self) -> Vector:
@@ -106,11 +87,17 @@ class Vehicle:
         clipped to what the motors can give and lag behind. `wind_m_s` is the air's velocity NED.
         """
         frame = self.airframe
-        lag = dt_s / (frame.motor_time_constant_s + dt_s)
-        self.thrust_n += lag * (min(max(thrust, 0.0), 1.0) * frame.max_thrust_n - self.thrust_n)
+        if self.is_broken:
+            thrust, torque = 0.0, (0.0, 0.0, 0.0)
+        wanted_n = min(max(thrust, 0.0), self.supply) * frame.max_thrust_n
+        lag_s = frame.motor_time_constant_s
+        if wanted_n < self.thrust_n and frame.motor_slowing_s is not None:
+            lag_s = frame.motor_slowing_s
+        lag = dt_s / (lag_s + dt_s)
+        self.thrust_n += lag * (wanted_n - self.thrust_n)
         # Torque comes from thrust differences: near zero and near full thrust none is left.
         share = self.thrust_n / frame.max_thrust_n
-        authority = min(1.0, 4.0 * share, 4.0 * (1.02 - share))
+        authority = max(0.0, min(1.0, 4.0 * share, 4.0 * (1.02 * self.supply - share)))
         tx, ty, tz = self._torque_n_m
         mx, my, mz = frame.max_torque_n_m
         tx += lag * (min(max(torque[0], -authority), authority) * mx - tx)
@@ -158,13 +145,23 @@ class Vehicle:
         norm = 1.0 / math.sqrt(w * w + x * x + y * y + z * z)
         self.quaternion = (w * norm, x * norm, y * norm, z * norm)
 
+    def crash(self) -> None:
+        """It has hit something: it loses its way and its propellers, and falls tumbling. Nothing mends it."""
+        self.is_broken = True
+        self.thrust_n = 0.0
+        self._torque_n_m = (0.0, 0.0, 0.0)
+        vn, ve, vd = self.velocity_m_s
+        self.velocity_m_s = (_LEFT_SPEED * vn, _LEFT_SPEED * ve, _LEFT_SPEED * vd)
+        self.rates_rad_s = _TUMBLE_RAD_S
+
     def _rest(self, ground_m: float) -> None:
-        """Stand on the gear: no motion, level, heading kept."""
+        """Stand on the gear: no motion, level, heading kept. Broken, it lies as it fell."""
         yaw_rad = self.euler_rad[2]
         self.position_m = (self.position_m[0], self.position_m[1], ground_m)
         self.velocity_m_s = self.acceleration_m_s2 = self.rates_rad_s = (0.0, 0.0, 0.0)
         self._torque_n_m = (0.0, 0.0, 0.0)
-        self.quaternion = (math.cos(yaw_rad / 2), 0.0, 0.0, math.sin(yaw_rad / 2))
+        if not self.is_broken:
+            self.quaternion = (math.cos(yaw_rad / 2), 0.0, 0.0, math.sin(yaw_rad / 2))
         self.is_on_ground = True
 
 

@@ -1,11 +1,24 @@
-"""Wind: a constant mean and MIL-F-8785C low-altitude Dryden gusts, the same for the same seed."""
+"""Wind: a constant mean with its profile, Dryden gusts by MIL-F-8785C's low-altitude model, and what else is asked for.
+
+The same seed brings the same wind.
+"""
 
 import math
 import random
 from dataclasses import dataclass
 
+from sitl.gust_front import GustFronts
+from sitl.lee import Lee
+from sitl.vehicle import Vector
+
 _FEET_PER_M = 1 / 0.3048
 _REFERENCE_HEIGHT_M = 20 * 0.3048  # W20 is the wind at 20 ft
+_MOST_ROUGHER = 0.5  # turbulence in a lee is up to half as strong again (sitl.lee)
+
+ROUGHNESS_M = 0.15 * 0.3048
+"""The roughness length of MIL-F-8785C's profile for the flight near the ground."""
+COVER_ROUGHNESS_M = {"water": 0.0002, "grass": 0.03, "crops": 0.10, "hedges": 0.25, "forest": 1.0}
+"""Roughness lengths by ground cover: the Davenport classes as Wieringa (J. Wind Eng. 41, 1992) gives them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -21,7 +34,7 @@ class GustScales:
 
 
 def gust_scales(height_m: float, wind_20ft_m_s: float) -> GustScales:
-    """Scales of MIL-F-8785C 3.7.3.4 for a height over the ground [m] and the mean wind at 20 ft, W20 [m/s].
+    """Scales of MIL-F-8785C 3.7.3 for a height over the ground [m] and the mean wind at 20 ft, W20 [m/s].
 
     The specification holds from 10 to 1000 ft; outside, its value at the nearer end is taken.
     """
@@ -78,37 +91,64 @@ class _FirstOrder:
 class Wind:
     """The air's velocity where the vehicle is.
 
-    `speed_m_s` is the mean at 20 ft; with height it follows the logarithmic profile of MIL-F-8785C 3.7.3.4
-    (roughness 0.15 ft). `from_rad` is where it blows from, clockwise from north; None draws it from `seed`.
+    `speed_m_s` is the mean at 20 ft; with height it follows the logarithmic profile of MIL-F-8785C 3.7.3
+    for the ground's roughness length (by default the specification's 0.15 ft). `from_rad` is where it blows from,
+    clockwise from north; None draws it from `seed`. `fronts` adds single gusts, `lee` what stands upwind.
     """
 
-    def __init__(self, speed_m_s: float, seed: int, from_rad: float | None = None) -> None:
+    def __init__(
+        self,
+        speed_m_s: float,
+        seed: int,
+        from_rad: float | None = None,
+        *,
+        roughness_m: float = ROUGHNESS_M,
+        fronts: GustFronts | None = None,
+    ) -> None:
         """Raises ValueError when `speed_m_s` is negative."""
         if speed_m_s < 0:
             raise ValueError(f"wind speed is {speed_m_s} m/s; give 0 or more, and its direction apart")
         draw = random.Random(f"wind {seed}")
         self.speed_m_s = speed_m_s
         self.from_rad = draw.uniform(-math.pi, math.pi) if from_rad is None else from_rad
+        self.roughness_m = roughness_m
+        self.lee: Lee | None = None
+        self._fronts = fronts
         self._along = (-math.cos(self.from_rad), -math.sin(self.from_rad))
         self._u = _FirstOrder(draw)
         self._v = _SecondOrder(draw)
         self._w = _SecondOrder(draw)
 
     def mean_m_s(self, height_m: float) -> float:
-        """Mean wind at a height over the ground [m]; below 3 ft it is that of 3 ft."""
-        roughness_m = 0.15 * 0.3048
-        height_m = max(height_m, 3 * 0.3048)
+        """Mean wind at a height over the ground [m]; below 3 ft, or twice the roughness, it is that of there."""
+        roughness_m = self.roughness_m
+        height_m = max(height_m, 3 * 0.3048, 2 * roughness_m)
         return self.speed_m_s * math.log(height_m / roughness_m) / math.log(_REFERENCE_HEIGHT_M / roughness_m)
 
-    def step(self, dt_s: float, height_m: float, airspeed_m_s: float) -> tuple[float, float, float]:
-        """The air's velocity NED [m/s] after `dt_s`; gusts drift past at `airspeed_m_s`, at least at the mean wind."""
+    def step(
+        self, dt_s: float, height_m: float, airspeed_m_s: float, position_ned_m: Vector = (0.0, 0.0, 0.0)
+    ) -> tuple[float, float, float]:
+        """The air's velocity NED [m/s] after `dt_s`; gusts drift past at `airspeed_m_s`, at least at the mean wind.
+
+        `height_m` is over the ground; the place NED [m] matters in the lee of something.
+        """
         if self.speed_m_s == 0.0:
             return (0.0, 0.0, 0.0)
         scales = gust_scales(height_m, self.speed_m_s)
         mean_m_s = self.mean_m_s(height_m)
         travelled_m = max(airspeed_m_s, mean_m_s) * dt_s
-        u = mean_m_s + scales.sigma_u_m_s * self._u.step(travelled_m / scales.length_u_m)
-        v = scales.sigma_v_m_s * self._v.step(travelled_m / scales.length_v_m)
-        w = scales.sigma_w_m_s * self._w.step(travelled_m / scales.length_w_m)
+        along = self._u.step(travelled_m / scales.length_u_m) * scales.sigma_u_m_s
+        across = self._v.step(travelled_m / scales.length_v_m) * scales.sigma_v_m_s
+        down = self._w.step(travelled_m / scales.length_w_m) * scales.sigma_w_m_s
+        if self._fronts is not None:
+            more, aside = self._fronts.step(dt_s, travelled_m)
+            along += more * mean_m_s
+            across += aside * mean_m_s
+        if self.lee is not None:
+            lost = self.lee.step(dt_s, position_ned_m)
+            rougher = 1.0 + min(lost, _MOST_ROUGHER)
+            along, across, down = rougher * along, rougher * across, rougher * down
+            mean_m_s *= 1.0 - lost
+        u = mean_m_s + along
         north, east = self._along
-        return (u * north - v * east, u * east + v * north, w)
+        return (u * north - across * east, u * east + across * north, down)

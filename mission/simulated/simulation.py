@@ -29,7 +29,7 @@ from sitl.pose import Pose, PoseBlock
 from sitl.render.map import render_map
 from sitl.server import AutopilotName, SitlSettings, SitlSummary, run
 from sitl.setup import SETUP
-from sitl.world.file import WorldError, load_world
+from sitl.world.file import DEFAULT_WORLD, WorldError, load_world
 from sitl.world.records import World
 
 __all__ = [
@@ -138,6 +138,10 @@ def sitl_settings(
         port=port,
         seed=scenario.seed,
         wind_m_s=scenario.wind_m_s,
+        wind_from_rad=scenario.wind_from_rad,
+        gust_fronts=scenario.has_gust_fronts,
+        airframe=scenario.airframe,
+        world=scenario.world or DEFAULT_WORLD,
         clock=clock,
         start_yaw_rad=world.start_yaw_rad,
         origin=world.origin,

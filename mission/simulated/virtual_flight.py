@@ -31,11 +31,9 @@ from mission.simulated.scenario import Scenario
 from mission.simulated.simulation import true_line
 from mission.simulated.virtual_time import VirtualClock, run_virtually
 from sitl.autopilot import SimAutopilot
-from sitl.parameters import Parameters
+from sitl.outfit import outfit
 from sitl.render.renderer import Renderer
-from sitl.setup import SETUP
-from sitl.vehicle import Vehicle, euler_of
-from sitl.wind import Wind
+from sitl.vehicle import euler_of
 from sitl.world.file import load_world
 from sitl.world.records import World
 
@@ -63,12 +61,13 @@ def fly_virtually(
     world = load_world(scenario.world, scenario.light)
     plan, camera = mission.plan, mission.camera
     cv2.setNumThreads(1)  # the camera's and the vision's thread are two already
-    sim = SimAutopilot(
-        Vehicle(yaw_rad=world.start_yaw_rad, ground=lambda n, e: -world.terrain.at(n, e)),
-        Wind(scenario.wind_m_s, scenario.seed),
+    sim = outfit(
+        world,
+        airframe=scenario.airframe,
+        wind_m_s=scenario.wind_m_s,
+        wind_from_rad=scenario.wind_from_rad,
         seed=scenario.seed,
-        parameters=Parameters(SETUP),
-        origin=world.origin,
+        gust_fronts=scenario.has_gust_fronts,
     )
     renderer = Renderer(world, camera, seed=scenario.seed)
     path = log_path(log_folder, plan.name, datetime.now(UTC))

@@ -131,7 +131,7 @@ def test_gusts_drift_past_at_the_speed_through_the_air() -> None:
             super().__init__(5.0, 0, math.pi)
             self.airspeeds_m_s: list[float] = []
 
-        def step(self, dt_s: float, height_m: float, airspeed_m_s: float) -> tuple[float, float, float]:
+        def step(self, dt_s, height_m, airspeed_m_s, position_ned_m=None) -> tuple[float, float, float]:  # type: ignore[no-untyped-def]
             self.airspeeds_m_s.append(airspeed_m_s)
             return (5.0, 0.0, 0.0)
 

@@ -10,9 +10,11 @@ import pytest
 from pymavlink.dialects.v20 import all as dialect
 
 from drivers.clock import NS_PER_S, ScaledClock
+from sitl.contact import Obstacles
 from sitl.place import Origin
 from sitl.pose import PoseBlock
 from sitl.server import AutopilotName, SitlSettings, SitlSummary, run
+from sitl.world.file import load_world
 
 pytestmark = pytest.mark.real_time
 
@@ -88,6 +90,22 @@ def test_a_missing_pose_block_is_an_error() -> None:
 def test_speed_is_flight_time_over_wall_time() -> None:
     assert SitlSummary(20.0, 5.0).achieved_speed == 4.0
     assert math.isfinite(SitlSummary(0.0, 0.0).achieved_speed)
+
+
+def test_it_flies_in_the_world_that_is_named_and_says_what_it_came_near_to() -> None:
+    clock = ScaledClock(10.0, time.monotonic_ns())
+    began_ns = clock.now_ns()
+    stops = StopAfter(clock, 30.0)
+    there = run(replace(settings(clock, free_port()), world="medium_voltage", airframe="x500"), stops)
+    assert there.testimony is not None
+    assert there.testimony.contact is None
+    assert there.testimony.conductor is not None
+    from_the_start_m = Obstacles(load_world("medium_voltage")).clearance((0.0, 0.0, 0.0)).conductor_m
+    assert there.testimony.conductor.distance_m == from_the_start_m
+    assert began_ns < there.testimony.conductor.t_ns <= clock.now_ns()
+    nowhere = run(settings(clock, free_port()), StopAfter(clock, 1.0))
+    assert nowhere.testimony is not None
+    assert nowhere.testimony.conductor is None
 
 
 @pytest.mark.parametrize(("autopilot", "number"), [("px4", 12), ("arducopter", 3)])
