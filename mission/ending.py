@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from mission.flight import FlightOutcome
     from mission.log.summary import FlightReport
     from mission.plan_file import MissionFile
+    from mission.simulated.aftermath import Aftermath
     from mission.simulated.simulation import World
 
 EXIT_FAILED_FILE = 1
@@ -68,12 +69,10 @@ def print_report(report: "FlightReport", *, as_json: bool) -> None:
     print_report(report, Console())
 
 
-def finish(
-    outcome: "FlightOutcome", *, as_json: bool, world: "World | None" = None, speed: float | None = None
-) -> NoReturn:
+def finish(outcome: "FlightOutcome", *, as_json: bool, aftermath: "Aftermath | None" = None) -> NoReturn:
     """Print the report, draw the picture, and exit with the code that tells how the flight ended.
 
-    `world` is a simulated flight's, `speed` how many times faster than real time it went.
+    `aftermath` is a simulated flight's. One that touched something has not gone well, whatever the mission thinks.
 
     What cannot be read or drawn afterwards is said, and changes nothing about how the flight ended.
     """
@@ -84,19 +83,25 @@ def finish(
     except LogError as error:
         sys.stderr.write(f"{error}\nThe mission {outcome.ended.result}: {outcome.ended.reason}.\n")
         raise typer.Exit(_exit_code(outcome)) from None
-    picture = _draw(outcome.log, world) if report.tasks else None
+    picture = _draw(outcome.log, None if aftermath is None else aftermath.world) if report.tasks else None
+    contact = None if aftermath is None else aftermath.contact
     if as_json:
         from mission.log.summary import to_json
 
-        extra = {"log": str(outcome.log), "picture": None if picture is None else str(picture), "achieved_speed": speed}
-        typer.echo(json.dumps(to_json(report) | extra))
+        extra = {"log": str(outcome.log), "picture": None if picture is None else str(picture)}
+        typer.echo(json.dumps(to_json(report) | extra | ({} if aftermath is None else aftermath.to_json())))
     else:
         print_report(report, as_json=False)
+        if aftermath is not None and aftermath.clearances is not None:
+            typer.echo(f"nearest  {aftermath.clearances}")
         typer.echo(f"log      {outcome.log}")
         if picture is not None:
             typer.echo(f"picture  {picture}")
-        if speed is not None:
-            typer.echo(f"speed    {speed:.2f} times real time")
+        if aftermath is not None and aftermath.speed is not None:
+            typer.echo(f"speed    {aftermath.speed:.2f} times real time")
+    if contact is not None:
+        sys.stderr.write(contact + "\n")
+        raise typer.Exit(EXIT_ENDED_EARLY)
     raise typer.Exit(_exit_code(outcome))
 
 

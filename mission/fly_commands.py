@@ -1,6 +1,7 @@
 """`lineflight dry-run`, `run`, `resume` and `sitl`: what flies."""
 
 import asyncio
+import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Literal, NoReturn
 
@@ -24,6 +25,13 @@ WorldOption = Annotated[str | None, typer.Option(help="A world's name or file; b
 # sitl.world.light.LightName, without its import
 LightName = Literal["noon", "low_sun", "overcast", "dusk"]
 LightOption = Annotated[LightName | None, typer.Option(help="The light of the day; by default the world's own.")]
+WindFromOption = Annotated[
+    float | None, typer.Option(min=-360, max=360, help="Degrees from north where the wind blows from; else by seed.")
+]
+GustFrontsOption = Annotated[bool, typer.Option("--gust-fronts", help="Single strong gusts, once a minute or twice.")]
+# sitl.airframes.AirframeName, without its import
+AirframeName = Literal["f550", "x500"]
+AirframeOption = Annotated[AirframeName, typer.Option(help="The simulated vehicle.")]
 LogOption = Annotated[Path, typer.Option(help="The folder for logs.")]
 JsonOption = Annotated[bool, typer.Option("--json", help="Print JSON instead of tables.")]
 
@@ -35,6 +43,9 @@ def dry_run(
     wind: WindOption = 0.0,
     world: WorldOption = None,
     light: LightOption = None,
+    wind_from: WindFromOption = None,
+    gust_fronts: GustFrontsOption = False,
+    airframe: AirframeOption = "f550",
     virtual_time: Annotated[
         bool,
         typer.Option("--virtual-time", help="In one process, without MAVLink: as fast as it can, and always the same."),
@@ -47,7 +58,7 @@ def dry_run(
     from mission.simulated.scenario import Scenario
     from mission.simulated.simulation import WorldError, world_path_or_name
 
-    scenario = Scenario(world_path_or_name(world), light, seed, wind)
+    scenario = Scenario(world_path_or_name(world), light, seed, wind, _radians(wind_from), gust_fronts, airframe)
     try:
         if virtual_time:
             _fly_virtually(mission_file, scenario, log, as_json=as_json)
@@ -65,10 +76,10 @@ def _fly_virtually(mission_file: "MissionFile", scenario: "Scenario", log: Path,
 
     try:
         with Watch(mission_file.plan, Console(stderr=True)) as watch:
-            flown = fly_virtually(mission_file, scenario, log, watch.show, watch.tell_checks)
+            outcome, aftermath = fly_virtually(mission_file, scenario, log, watch.show, watch.tell_checks)
     except LogError as error:
         fail(str(error), EXIT_FAILED_FILE)
-    finish(flown.outcome, as_json=as_json, world=flown.world, speed=flown.speed)
+    finish(outcome, as_json=as_json, aftermath=aftermath)
 
 
 def _fly_beside(
@@ -97,13 +108,7 @@ def _fly_beside(
             true_pose=simulation.true_pose,
         )
         outcome = _fly_watched(setup)
-    summary = simulation.summary
-    finish(
-        outcome,
-        as_json=as_json,
-        world=simulation.world,
-        speed=None if summary is None else summary.achieved_speed,
-    )
+    finish(outcome, as_json=as_json, aftermath=simulation.aftermath)
 
 
 def run(
@@ -188,6 +193,10 @@ def resume(
     _run(mission_file, connection or begin.connection, camera or begin.camera, log, as_json, (remaining, resumption))
 
 
+def _radians(degrees: float | None) -> float | None:
+    return None if degrees is None else math.radians(degrees)
+
+
 def _sentence(words: str) -> str:
     return words[:1].upper() + words[1:].rstrip(".") + "."
 
@@ -198,6 +207,9 @@ def sitl(
     port: Annotated[int, typer.Option(min=1, max=65535 - 40, help="UDP port that the vehicle sends to.")] = 14540,
     seed: SeedOption = 1,
     wind: WindOption = 0.0,
+    wind_from: WindFromOption = None,
+    gust_fronts: GustFrontsOption = False,
+    airframe: AirframeOption = "f550",
     autopilot: Annotated[Literal["px4", "arducopter"], typer.Option(help="Whose MAVLink the vehicle speaks.")] = "px4",
 ) -> None:
     """Run only the simulated vehicle, until Ctrl-C; any MAVLink program can fly it."""
@@ -209,7 +221,10 @@ def sitl(
     typer.echo(f"The simulated vehicle sends to udp 127.0.0.1:{port}; Ctrl-C ends it.", err=True)
     try:
         summary = serve_until_stopped(
-            Scenario(world_path_or_name(world), seed=seed, wind_m_s=wind), speed, port, autopilot
+            Scenario(world_path_or_name(world), None, seed, wind, _radians(wind_from), gust_fronts, airframe),
+            speed,
+            port,
+            autopilot,
         )
     except (WorldError, OSError) as error:
         fail(str(error), EXIT_BAD_INPUT)

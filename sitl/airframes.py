@@ -2,11 +2,13 @@
 
 import math
 from dataclasses import dataclass
+from typing import Literal
 
 from sitl.battery import Pack
 
 GRAVITY_M_S2 = 9.80665
 
+AirframeName = Literal["f550", "x500"]
 _Axes = tuple[float, float, float]
 _F550_PACK = Pack()
 

@@ -22,6 +22,7 @@ from drivers.camera.camera import Camera, Intrinsics
 from drivers.clock import ScaledClock
 from mission.autopilot import VehicleState
 from mission.records import TrueLine, TruePose
+from mission.simulated.aftermath import Aftermath
 from mission.simulated.scenario import Scenario
 from sitl.camera import SimCamera
 from sitl.control import quaternion_of
@@ -79,6 +80,14 @@ class Simulation:
         """Where the vehicle truly is; None before the first step."""
         pose = self._poses.read()
         return None if pose is None else TruePose(pose.t_ns, pose.north_m, pose.east_m, pose.down_m, pose.yaw_rad)
+
+    @property
+    def aftermath(self) -> Aftermath:
+        """What is known of the flight when it is over."""
+        summary = self.summary
+        if summary is None:
+            return Aftermath(self.world, None, None)
+        return Aftermath(self.world, summary.achieved_speed, summary.testimony)
 
     def __enter__(self) -> Self:
         self._process.start()

@@ -6,7 +6,6 @@ It goes as fast as the machine can, and the same scenario gives the same flight,
 import asyncio
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -25,6 +24,7 @@ from mission.logbook import FlightPapers, Logbook
 from mission.plan_file import MissionFile
 from mission.records import TruePose
 from mission.reporting import Progress
+from mission.simulated.aftermath import Aftermath
 from mission.simulated.in_process import InProcessAutopilot
 from mission.simulated.rendered_eyes import RenderedEyes
 from mission.simulated.scenario import Scenario
@@ -35,19 +35,9 @@ from sitl.outfit import outfit
 from sitl.render.renderer import Renderer
 from sitl.vehicle import euler_of
 from sitl.world.file import load_world
-from sitl.world.records import World
 
 _PROGRESS_PERIOD_S = 1.0
 _TRUTH_PERIOD_NS = NS_PER_S // 20
-
-
-@dataclass(frozen=True, slots=True)
-class VirtualFlown:
-    """A flight in virtual time that is over: how it ended, its speed over real time, and the world."""
-
-    outcome: FlightOutcome
-    speed: float
-    world: World
 
 
 def fly_virtually(
@@ -56,8 +46,11 @@ def fly_virtually(
     log_folder: Path,
     on_progress: Callable[[Progress], None],
     on_checks: Callable[[Sequence[Check]], None],
-) -> VirtualFlown:
-    """Fly a mission in a scenario. Raises WorldError, and LogError when the log cannot be made."""
+) -> tuple[FlightOutcome, Aftermath]:
+    """Fly a mission in a scenario, and say how it ended.
+
+    Raises WorldError, AirframeError, and LogError when the log cannot be made.
+    """
     world = load_world(scenario.world, scenario.light)
     plan, camera = mission.plan, mission.camera
     cv2.setNumThreads(1)  # the camera's and the vision's thread are two already
@@ -117,7 +110,8 @@ def fly_virtually(
             on_progress(executive.progress)
         return FlightOutcome(ended, executive.may_have_armed, path, recorder.failure), sim.boot_s / wall_s
 
-    return VirtualFlown(*run_virtually(flight()), world)
+    outcome, speed = run_virtually(flight())
+    return outcome, Aftermath(world, speed, None if sim.witness is None else sim.witness.summary)
 
 
 def _truth_recorder(sim: SimAutopilot, recorder: Recorder) -> Callable[[], None]:

@@ -254,7 +254,7 @@ def test_a_hot_day_shows_in_the_line(tmp_path: Path) -> None:
     ],
 )  # fmt: skip
 def test_a_line_that_cannot_be_names_its_key(tmp_path: Path, lines: str, key: str) -> None:
-    with pytest.raises(WorldError, match="mine.yaml is wrong at ") as caught:
+    with pytest.raises(WorldError, match=r"mine\.yaml is wrong at ") as caught:
         world_of(tmp_path, lines)
     assert f" {key}:" in str(caught.value)
     assert "\n" not in str(caught.value)
