@@ -144,12 +144,25 @@ def sight_of(
     state = history.at(report.t_capture_ns)
     if state is None:
         return None
-    line, is_whole = None, False
-    if report.estimate is not None:
-        line = locate_line(report.estimate, state, camera, guidance.height_over_line_m)
-        is_whole = group.is_whole(report.estimate.n_lines)
+    line, next_line, is_whole = None, None, False
+    estimate = report.estimate
+    if estimate is not None:
+        line = locate_line(estimate, state, camera, guidance.height_over_line_m)
+        is_whole = group.is_whole(estimate.n_lines)
+        if estimate.next_span is not None:
+            span = estimate.next_span
+            beyond = replace(estimate, angle_rad=span.angle_rad, offset_px=span.offset_px)
+            next_line = locate_line(beyond, state, camera, guidance.height_over_line_m)
     return Sight(
-        report.t_capture_ns, state.yaw_rad, report.estimate, line, is_whole, state.north_m, state.east_m, state.down_m
+        report.t_capture_ns,
+        state.yaw_rad,
+        estimate,
+        line,
+        is_whole,
+        state.north_m,
+        state.east_m,
+        state.down_m,
+        next_line,
     )
 
 
@@ -200,7 +213,7 @@ class Lookout:
             return sight
         now_s = sight.t_capture_ns / NS_PER_S
         if not known.is_it(sight.line, sight.north_m, sight.east_m, now_s, is_whole=sight.is_whole):
-            return replace(sight, estimate=None, line=None, is_whole=False)
+            return replace(sight, estimate=None, line=None, next_line=None, is_whole=False)
         if sight.is_whole:
             known.follow(sight.line, now_s)
             known.measure(sight.estimate, self._guidance.height_over_line_m / self._camera.fx_px)

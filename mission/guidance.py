@@ -64,6 +64,17 @@ class WorldLine:
         along = nearest_heading_rad(self.heading_rad, heading_rad)
         return -math.sin(along) * (self.north_m - north_m) + math.cos(along) * (self.east_m - east_m)
 
+    def meeting_m(self, other: "WorldLine", north_m: float, east_m: float) -> float:
+        """How far from a place this line and another one meet [m]; infinite for parallel ones."""
+        sine = math.sin(other.heading_rad - self.heading_rad)
+        if abs(sine) < 1e-6:
+            return math.inf
+        d_north_m, d_east_m = other.north_m - self.north_m, other.east_m - self.east_m
+        along_m = (d_north_m * math.sin(other.heading_rad) - d_east_m * math.cos(other.heading_rad)) / sine
+        meeting_north_m = self.north_m + along_m * math.cos(self.heading_rad)
+        meeting_east_m = self.east_m + along_m * math.sin(self.heading_rad)
+        return math.hypot(meeting_north_m - north_m, meeting_east_m - east_m)
+
     def crossing_m(self, north_m: float, east_m: float, heading_rad: float) -> float | None:
         """How far ahead a ray from the point along `heading_rad` crosses the line [m]; None within 20 degrees of it."""
         sine = math.sin(self.heading_rad - heading_rad)

@@ -13,6 +13,9 @@ from vision.records import LineEstimate, wrap_line_angle_rad
 _TOLERANCE_M = 1.5  # what the estimates of place and height err by from one frame to the next ones
 _DRIFT_M_S = 0.2  # the position may drift so fast while the line is out of sight
 _MOST_M = 4.0
+_STRAIGHT_RAD = 0.21  # 12 degrees: less may be a wrong angle
+_AWAY_M = 6.0  # how far from the vehicle a bend may be, seen or flown past
+_MOST_AWAY_M = 12.0
 _MAX_TURN_RAD = 1.2  # 69 degrees: angle supports turn by 60
 
 
@@ -42,12 +45,19 @@ class KnownLine:
         self.half_width_m = 0.5 * (estimate.n_lines - 1) * (estimate.spacing_px or 0.0) * m_per_px
 
     def is_it(self, line: WorldLine, north_m: float, east_m: float, now_s: float, *, is_whole: bool) -> bool:
-        """Whether a line seen from a place may be the known one; where a part is seen, its middle may lie beside it."""
+        """Whether a line seen from a place may be the known one; where a part is seen, its middle may lie beside it.
+
+        One that has turned begins where the known one ends: they meet near the place.
+        """
         if self.line is None:
             return True
         heading_rad = self.line.heading_rad
-        if abs(wrap_line_angle_rad(line.heading_rad - heading_rad)) > _MAX_TURN_RAD:
+        turn_rad = abs(wrap_line_angle_rad(line.heading_rad - heading_rad))
+        if turn_rad > _MAX_TURN_RAD:
             return False
+        drift_m = _DRIFT_M_S * max(0.0, now_s - self.seen_s)
+        part_m = 0.0 if is_whole else self.half_width_m
+        if turn_rad > _STRAIGHT_RAD:
+            return line.meeting_m(self.line, north_m, east_m) <= min(_MOST_AWAY_M, _AWAY_M + part_m + 3.0 * drift_m)
         aside_m = line.offset_m(north_m, east_m, heading_rad) - self.line.offset_m(north_m, east_m, heading_rad)
-        allowed_m = min(_MOST_M, _TOLERANCE_M + _DRIFT_M_S * max(0.0, now_s - self.seen_s))
-        return abs(aside_m) <= allowed_m + (0.0 if is_whole else self.half_width_m)
+        return abs(aside_m) <= min(_MOST_M, _TOLERANCE_M + drift_m) + part_m

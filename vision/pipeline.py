@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.camera.camera import Intrinsics
+from vision.bend import find_bend
 from vision.checks import check_shares
 from vision.conductors import Conductor, find_conductors
 from vision.edge_lines import ProjectionFinder, ProjectionSettings
@@ -24,7 +25,7 @@ from vision.finders import (
 from vision.lens import LensCorrection
 from vision.line_group import abreast, choose_group, middle_offset_px, spacing_px
 from vision.orientation import main_angle_rad, mean_line_angle_rad, segment_angles_rad
-from vision.records import Detection, Segments
+from vision.records import Detection, NextSpan, Segments
 
 Detector = Literal["projection", "cbs", "steerable", "hough", "lsd", "edlines"]
 
@@ -133,7 +134,18 @@ class LineFinder:
             settings.min_relative_support,
             settings.min_relative_contrast,
         )
-        power_lines = np.array([edge for conductor in group for edge in conductor.edges]).reshape(-1, 4)
+        bend = find_bend(
+            conductors,
+            group,
+            shape,
+            settings.main_angle_tolerance_rad,
+            settings.min_relative_support,
+            settings.min_relative_contrast,
+        )
+        beyond = [] if bend is None else bend.beyond.conductors
+        if bend is not None:
+            group = bend.here.conductors
+        power_lines = np.array([edge for conductor in (*group, *beyond) for edge in conductor.edges]).reshape(-1, 4)
         power_lines.setflags(write=False)
         segments = edges.segments
         if lens is not None:
@@ -143,20 +155,23 @@ class LineFinder:
             weights = (edges.coherence * edges.covered_px) ** 2
             peak_rad = main_angle_rad(segment_angles_rad(edges.segments), weights)
             return Detection(segments, power_lines, peak_rad, 0.0, 0, None, 0.0, False)
-        return self._judge(segments, power_lines, group, shape)
+        next_span = None if bend is None else NextSpan(bend.beyond.angle_rad, bend.beyond.offset_px)
+        return self._judge(segments, power_lines, group, beyond, next_span, shape)
 
     def _judge(
         self,
         segments: Segments,
         power_lines: Segments,
         group: list[Conductor],
+        beyond: list[Conductor],
+        next_span: NextSpan | None,
         shape: tuple[int, int],
     ) -> Detection:
-        """Say from the conductors whether there is a power line, and where its middle runs."""
+        """Say from the conductors, here and beyond a bend, whether there is a power line, and where its middle runs."""
         settings = self._settings
         is_present = any(
             c.support >= max(settings.presence_min_support, settings.presence_min_sigmas / math.sqrt(c.length_px))
-            for c in group
+            for c in (*group, *beyond)
         )
         angle_rad = mean_line_angle_rad(
             np.array([c.angle_rad for c in group]), np.array([c.length_px**2 for c in group])
@@ -173,4 +188,5 @@ class LineFinder:
             spacing_px(row, angle_rad, shape),
             confidence if is_present else min(confidence, settings.presence_min_support),
             is_present,
+            next_span,
         )

@@ -29,6 +29,14 @@ def wrap_line_angle_rad(angle_rad: float) -> float:
 
 
 @dataclass(frozen=True, slots=True)
+class NextSpan:
+    """The span on the other side of an angle support in view; `angle_rad` and `offset_px` as in LineEstimate."""
+
+    angle_rad: float
+    offset_px: float
+
+
+@dataclass(frozen=True, slots=True)
 class LineEstimate:
     """The line group that one frame shows.
 
@@ -36,7 +44,8 @@ class LineEstimate:
     along its right-hand normal n = (cos angle_rad, sin angle_rad); so at angle 0 a positive offset is a line right of
     the centre. `n_lines` counts the conductors taken; `spacing_px` is the median distance of neighbours among them,
     None for a single one. `confidence` is in [0, 1], `t_capture_ns` is the frame's. Where the lens is calibrated, the
-    pixels are those of the undistorted image.
+    pixels are those of the undistorted image. Where the line bends in view, all of it is about the span abreast of the
+    image centre, and `next_span` about the other one.
     """
 
     angle_rad: float
@@ -45,11 +54,12 @@ class LineEstimate:
     spacing_px: float | None
     confidence: float
     t_capture_ns: int
+    next_span: NextSpan | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)  # arrays have no single answer to ==
 class Detection:
-    """All that the pipeline found in one image; `angle_rad`, `offset_px` and `spacing_px` as in LineEstimate.
+    """All that the pipeline found in one image; what stands in LineEstimate, too, is meant as there.
 
     Segments run with the brighter side of their edge on their right. `angle_rad` is None where the image holds no
     segment at all. `is_present` says whether at least one thin conductor crosses enough of the frame (docs/decisions,
@@ -64,13 +74,20 @@ class Detection:
     spacing_px: float | None
     confidence: float
     is_present: bool
+    next_span: NextSpan | None = None
 
     def estimate(self, t_capture_ns: int) -> LineEstimate | None:
         """The estimate that guidance gets for a frame taken at `t_capture_ns`: None where no line is present."""
         if not self.is_present or self.angle_rad is None:
             return None
         return LineEstimate(
-            self.angle_rad, self.offset_px, self.n_lines, self.spacing_px, self.confidence, t_capture_ns
+            self.angle_rad,
+            self.offset_px,
+            self.n_lines,
+            self.spacing_px,
+            self.confidence,
+            t_capture_ns,
+            self.next_span,
         )
 
 

@@ -12,6 +12,8 @@ BLOCK = 16  # rows that are judged together
 _REACH = 3  # how many columns from where it was found an edge is looked for
 _MIN_BLOCK_COHERENCE = 0.3
 _N_TURNS = 3
+_TAIL = 0.25  # share of a line's coherence that the blocks beyond its end show at most
+_MIN_TAIL = 0.25  # share of its blocks: shorter ones may as well be a gap
 _PLATEAU = 0.5  # share of the best column's coherence that its neighbours need to belong to the same edge
 
 
@@ -84,16 +86,17 @@ def refine(
         slope += turn_slope
         if abs(step) > _REACH + 1 or abs(slope) > 1.2:
             return nothing
-    good_first, good_last, covered, coherence = -1, -1, 0, 0.0
+    good_first, good_last = -1, -1
     for block in range(n_blocks):
         if weight[block] >= _MIN_BLOCK_COHERENCE:
             if good_first < 0:
                 good_first = block
             good_last = block
-            covered += 1
     # Along the whole line at once, so that texture cannot choose its best place in each block.
-    for k in range(3):
-        coherence = max(coherence, beside[good_first : good_last + 1, k].mean())
+    good_first, good_last, coherence = _surest_run(beside, good_first, good_last)
+    covered = 0
+    for block in range(good_first, good_last + 1):
+        covered += weight[block] >= _MIN_BLOCK_COHERENCE
     # A block that is supported is supported to its end; the frame's outermost pixels have no gradient.
     begin_y = 0.0 if good_first == 0 and first <= 1 else first + n_rows * good_first / n_blocks
     end_y = (
@@ -107,6 +110,38 @@ def refine(
     if sign > 0:  # brighter towards larger x, which is on the right of one who goes up
         return end_x, end_y, begin_x, begin_y, coherence, covered_length
     return begin_x, begin_y, end_x, end_y, coherence, covered_length
+
+
+@njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]
+def _surest_run(beside: NDArray[np.float64], first: int, last: int) -> tuple[int, int, float]:
+    """The blocks from where to where the line is, within `first` to `last`, and its mean coherence there.
+
+    `beside` (n, 3) holds the blocks' coherence in three columns. A line that ends in the frame, at a bend or a pole,
+    leaves blocks of mere texture beyond its end: they are cut off where they have much less coherence than the rest.
+    """
+    column, coherence = 0, -1.0
+    for k in range(3):
+        mean = beside[first : last + 1, k].mean()
+        if mean > coherence:
+            column, coherence = k, mean
+    # The run that stands out most from half of what the better half of the blocks has (Kadane's maximal sum).
+    ranked = np.sort(beside[first : last + 1, column])
+    level = 0.5 * ranked[len(ranked) // 2 :].mean()
+    best, begin, total, run_first, run_last = 0.0, first, 0.0, first, last
+    for block in range(first, last + 1):
+        if total <= 0.0:
+            begin, total = block, 0.0
+        total += beside[block, column] - level
+        if total > best:
+            best, run_first, run_last = total, begin, block
+    n_run, n_rest = run_last - run_first + 1, last - first - run_last + run_first
+    if n_run < 2 or n_rest < _MIN_TAIL * (n_run + n_rest):
+        return first, last, coherence
+    inside = beside[run_first : run_last + 1, column].mean()
+    outside = (coherence * (last - first + 1) - inside * n_run) / n_rest
+    if outside >= _TAIL * inside:
+        return first, last, coherence
+    return run_first, run_last, inside
 
 
 @njit(cache=True, nogil=True)  # type: ignore[untyped-decorator]

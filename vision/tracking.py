@@ -78,6 +78,11 @@ class LineTracker:
 
     def _agrees(self, before: LineEstimate, now: LineEstimate, diagonal_px: float) -> bool:
         """Whether the line may have moved from the one place to the other in that time."""
+        if before.next_span is not None:
+            # The span beyond a bend is the same line: the vehicle may be over it now.
+            beyond = replace(before, angle_rad=before.next_span.angle_rad, offset_px=before.next_span.offset_px)
+            if self._agrees(replace(beyond, next_span=None), now, diagonal_px):
+                return True
         settings = self._settings
         moving_s = elapsed_s(before, now.t_capture_ns)
         now = seen_along(now, before.angle_rad)

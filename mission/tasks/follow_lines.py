@@ -15,11 +15,14 @@ from mission.guidance import (
 )
 from mission.tasks.odometer import NEARLY_M, Odometer
 from mission.tasks.task import FlightMemory, Observation, Sight, Step, is_there
+from vision.records import wrap_line_angle_rad
 
 _SLOWEST = 0.25  # of r
 _STRAIGHT_RAD = math.radians(5.0)  # a turn that is left and takes no speed away
 _TURN_RAD = math.radians(25.0)  # and over which it does
 _PICK_UP_S = 1.5
+_SAME_RAD = math.radians(6.0)  # two sights of one span differ by less
+_PASSED_M = 1.0  # so far behind the vehicle, a bend in view is still one to turn at
 
 
 class FollowLinesTask:
@@ -41,7 +44,10 @@ class FollowLinesTask:
         self._target_rad: float | None = None
         self._line: WorldLine | None = None
         self._unseen_s = 0.0
+        self._course_rad = 0.0
         self._pace = 1.0
+        self._bend_m: float | None = None  # how far ahead of the setpoint the line bends
+        self._left: float | None = None  # the heading of the span before the last bend, while that is in sight
 
     @property
     def progress(self) -> float:
@@ -63,18 +69,24 @@ class FollowLinesTask:
             )
             setpoint = replace(reference, yaw_rad=yaw_rad)
         is_blind = self._unseen_s > guidance.max_estimate_age_s  # then wait for the line, or for the line_lost event
-        left_m = self._distance_m - self._odometer.update(reference, reference.yaw_rad)
+        if self._target_rad is None:
+            self._course_rad = reference.yaw_rad
+        left_m = self._distance_m - self._odometer.update(reference, self._course_rad)
         speed_m_s = guidance.r_m_s * self._wanted_pace(turn_rad, seen.dt_s) if guidance.is_centred else guidance.r_m_s
         step_m = 0.0 if is_blind else min(speed_m_s * seen.dt_s, max(0.0, left_m))
-        setpoint = step_along(setpoint, setpoint.yaw_rad, step_m)
+        course_rad = setpoint.yaw_rad
+        if guidance.is_centred and self._target_rad is not None:
+            course_rad = self._target_rad  # along the line at once; the nose follows
+        self._course_rad = course_rad
+        setpoint = step_along(setpoint, course_rad, step_m)
         if guidance.is_centred and self._line is not None:
-            vehicle_off_m = self._line.offset_m(seen.state.north_m, seen.state.east_m, setpoint.yaw_rad)
+            vehicle_off_m = self._line.offset_m(seen.state.north_m, seen.state.east_m, course_rad)
             setpoint = step_sideways(
                 setpoint,
                 self._line,
-                setpoint.yaw_rad,
+                course_rad,
                 guidance.lateral_per_s,
-                guidance.lateral_max_m_s,
+                guidance.lateral_max_m_s if self._left is None else guidance.r_m_s,
                 seen.dt_s,
                 beyond_m=guidance.lateral_lead * vehicle_off_m,
             )
@@ -83,17 +95,41 @@ class FollowLinesTask:
         return Step(setpoint)
 
     def _see(self, reference: Setpoint, sight: Sight, line: WorldLine) -> None:
-        heading_rad = reference.yaw_rad if self._target_rad is None else self._target_rad
-        self._target_rad = nearest_heading_rad(line.heading_rad, heading_rad)
-        if sight.is_whole:
-            self._line = line
-            self._memory.known_line.begin(line, sight.t_capture_ns)
+        """Choose between the spans in sight: on the one that is followed, until the setpoint is at the bend."""
         self._unseen_s = 0.0
+        if sight.is_whole:
+            self._memory.known_line.begin(line, sight.t_capture_ns)
+        if self._target_rad is None or not self._guidance.is_centred:
+            self._take(line, reference.yaw_rad if self._target_rad is None else self._target_rad, sight)
+            return
+        target_rad = self._target_rad
+        spans = [line] if sight.next_line is None else [line, sight.next_line]
+        spans.sort(key=lambda span: abs(wrap_line_angle_rad(span.heading_rad - target_rad)))
+        if self._left is not None and abs(wrap_line_angle_rad(spans[0].heading_rad - self._left)) < _SAME_RAD:
+            return  # the vehicle is still over the span that the setpoint has left
+        self._left = None if len(spans) == 1 else self._left
+        self._take(spans[0], target_rad, sight)
+        self._bend_m = None
+        if len(spans) == 1 or self._left is not None:
+            return
+        from_vehicle_m = spans[1].crossing_m(sight.north_m, sight.east_m, target_rad)
+        bend_m = spans[1].crossing_m(reference.north_m, reference.east_m, target_rad)
+        if bend_m is not None and from_vehicle_m is not None and from_vehicle_m > -_PASSED_M:
+            self._bend_m = bend_m
+            if bend_m <= 0.0:
+                self._left = spans[0].heading_rad
+                self._take(spans[1], target_rad, sight)
+
+    def _take(self, line: WorldLine, heading_rad: float, sight: Sight) -> None:
+        self._target_rad = nearest_heading_rad(line.heading_rad, heading_rad)
+        self._line = line if sight.is_whole or sight.next_line is not None else self._line
 
     def _wanted_pace(self, turn_rad: float, dt_s: float) -> float:
         """The share of r to fly at: less while the line is not seen, and while there is still a way to turn."""
         unseen = self._unseen_s / self._guidance.max_estimate_age_s
-        goal = max(_SLOWEST, min(1.0 - unseen, 1.0 - (abs(turn_rad) - _STRAIGHT_RAD) / _TURN_RAD))
+        turning = (abs(turn_rad) - _STRAIGHT_RAD) / _TURN_RAD
+        near_bend = 0.0 if self._bend_m is None else 0.5
+        goal = max(_SLOWEST, min(1.0 - unseen, 1.0 - turning, 1.0 - near_bend))
         # Slower at once, faster again over a second or so.
         self._pace = min(goal, self._pace + dt_s / _PICK_UP_S)
         return min(1.0, self._pace)

@@ -21,7 +21,7 @@ class Sight:
 
     `line` is the estimate put on the map with the vehicle's pose at the time of capture. Its heading always counts; its
     place only where `is_whole`: when the frame showed all of the line's conductors, as far as known. The vehicle was at
-    `north_m`, `east_m`, `down_m` then.
+    `north_m`, `east_m`, `down_m` then. `next_line` is the span on the other side of an angle support in view.
     """
 
     t_capture_ns: int
@@ -32,6 +32,7 @@ class Sight:
     north_m: float = 0.0
     east_m: float = 0.0
     down_m: float = 0.0
+    next_line: WorldLine | None = None
 
 
 @dataclass(frozen=True, slots=True)
