@@ -18,8 +18,14 @@ THINGS: tuple[Thing, ...] = ("conductor", "support", "tree", "building")
 
 _CELL_M = 8.0
 _ROUND_CORNERS = 9
-# Where a crown begins, as a share of the tree's height. Its trunk reaches into it.
-_CROWN_FROM: dict[TreeKind, float] = {"broadleaf": 0.3, "conifer": 0.1, "poplar": 0.1, "bush": 0.0}
+# Where a crown begins at its trunk, and where it is widest, in shares of the tree's height: from there on upwards it is
+# what one sees of it from above (sitl.world.surface), but for its clumps.
+_CROWNS: dict[TreeKind, tuple[float, float]] = {
+    "broadleaf": (0.25, 0.42),
+    "conifer": (0.12, 0.12),
+    "poplar": (0.1, 0.3),
+    "bush": (0.0, 0.0),
+}
 _TRUNK_RADIUS = 0.015  # of the height
 _BELOW_GROUND_M = 5.0  # houses go on below, so that a slope does not come out under them
 _N_BAR_NUMBERS, _N_SOLID_NUMBERS = 8, 8
@@ -156,18 +162,12 @@ def _bar(start: PointNed | list[float], end: PointNed | list[float], *radii_m: f
 
 
 def _crown_profile(tree: Tree, ground_m: float) -> list[tuple[float, float]]:
-    """A conifer's crown is a cone, a bush half an ellipsoid, the others a whole one."""
-    foot_m, top_m = ground_m + _CROWN_FROM[tree.kind] * tree.height_m, ground_m + tree.height_m
-    radius_m = tree.crown_radius_m
-    if tree.kind == "conifer":
-        return [(0.0, foot_m), (radius_m, foot_m), (0.0, top_m)]
-    if tree.kind == "bush":
-        angles = np.linspace(0.0, math.pi / 2, _ROUND_CORNERS).tolist()
-        height_m = tree.height_m
-        return [(0.0, foot_m), *((radius_m * math.cos(a), foot_m + height_m * math.sin(a)) for a in angles)]
-    middle_m, half_m = (foot_m + top_m) / 2, (top_m - foot_m) / 2
-    angles = np.linspace(-math.pi / 2, math.pi / 2, 2 * _ROUND_CORNERS - 1).tolist()
-    return [(radius_m * abs(math.cos(a)), middle_m + half_m * math.sin(a)) for a in angles]
+    """A conifer's crown is a cone, the others' are domes over a blunt underside."""
+    foot, widest = _CROWNS[tree.kind]
+    foot_m, widest_m = ground_m + foot * tree.height_m, ground_m + widest * tree.height_m
+    dome_m, radius_m = (1.0 - widest) * tree.height_m, tree.crown_radius_m
+    angles = [0.0, math.pi / 2] if tree.kind == "conifer" else np.linspace(0.0, math.pi / 2, _ROUND_CORNERS).tolist()
+    return [(0.0, foot_m), *((radius_m * math.cos(a), widest_m + dome_m * math.sin(a)) for a in angles)]
 
 
 def _house_profile(building: Building, ground_m: float) -> list[tuple[float, float]]:

@@ -11,7 +11,7 @@ from sitl.parameters import Parameters
 from sitl.place import Origin
 from sitl.setup import SETUP
 from sitl.vehicle import GroundHeight, Vehicle, flat_ground
-from sitl.wind import Wind
+from sitl.wind import COVER_ROUGHNESS_M, ROUGHNESS_M, Wind
 from sitl.witness import Witness
 from sitl.world.height_grid import HeightGrid
 from sitl.world.light import LIGHTS
@@ -40,7 +40,13 @@ def outfit(
     over PX4's defaults; `speed` is how many times faster than the wall clock it will be stepped.
     Raises AirframeError, KeyError and TypeError for a wrong parameter, ValueError for a wind below 0.
     """
-    wind = Wind(wind_m_s, seed, wind_from_rad, fronts=GustFronts(seed) if gust_fronts else None)
+    wind = Wind(
+        wind_m_s,
+        seed,
+        wind_from_rad,
+        roughness_m=COVER_ROUGHNESS_M.get(world.ground.style, ROUGHNESS_M),
+        fronts=GustFronts(seed) if gust_fronts else None,
+    )
     surface = surface_of(world)
     if wind_m_s > 0.0 and surface is not world.terrain:
         wind.lee = Lee(surface, world.terrain, wind.from_rad, wind.roughness_m)

@@ -16,9 +16,15 @@ _REFERENCE_HEIGHT_M = 20 * 0.3048  # W20 is the wind at 20 ft
 _MOST_ROUGHER = 0.5  # turbulence in a lee is up to half as strong again (sitl.lee)
 
 ROUGHNESS_M = 0.15 * 0.3048
-"""The roughness length of MIL-F-8785C's profile for the flight near the ground."""
-COVER_ROUGHNESS_M = {"water": 0.0002, "grass": 0.03, "crops": 0.10, "hedges": 0.25, "forest": 1.0}
-"""Roughness lengths by ground cover: the Davenport classes as Wieringa (J. Wind Eng. 41, 1992) gives them."""
+"""The roughness length of MIL-F-8785C's profile near the ground [m]."""
+COVER_ROUGHNESS_M = {
+    "pasture": ROUGHNESS_M,
+    "meadow": 0.03,
+    "cropland": 0.10,
+    "village": 0.50,
+    "forest_floor": 1.0,
+}
+"""Roughness lengths by ground cover [m]: the Davenport classes (Wieringa, J. Wind Eng. 41, 1992), and a pasture's."""
 
 
 @dataclass(frozen=True, slots=True)

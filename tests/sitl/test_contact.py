@@ -61,15 +61,20 @@ def test_a_house_has_walls_and_a_roof() -> None:
 
 def test_a_conifer_is_a_cone_on_a_trunk() -> None:
     assert above(0.0, 40.0, 12.0).tree_m == pytest.approx(2.0)
-    # Right away from the cone's side, which goes from 3 m at 1 m height to 0 at 10 m.
-    side = math.hypot(9.0, 3.0)
-    assert above(1.5 + 4 * 9 / side, 40.0, 5.5 + 4 * 3 / side).tree_m == pytest.approx(4.0)
-    assert above(5.0, 40.0, 0.0).tree_m == pytest.approx(math.hypot(2.0, 1.0))
+    # Right away from the middle of the cone's side, which goes from 3 m at 1.2 m height to 0 at 10 m.
+    side = math.hypot(8.8, 3.0)
+    assert above(1.5 + 4 * 8.8 / side, 40.0, 5.6 + 4 * 3 / side).tree_m == pytest.approx(4.0)
+    assert above(5.0, 40.0, 0.0).tree_m == pytest.approx(math.hypot(2.0, 1.2))
+    assert above(1.0, 40.0, 0.0).tree_m == pytest.approx(0.85)
 
 
-def test_a_broadleaf_crown_is_an_ellipsoid_and_a_bush_half_a_one() -> None:
+def test_a_broadleaf_crown_is_a_dome_and_a_bush_stands_on_the_ground() -> None:
     assert above(-20.0, 40.0, 15.0).tree_m == pytest.approx(3.0)
-    assert above(-30.0, 40.0, 0.65 * 12.0).tree_m == pytest.approx(6.0, abs=0.01)
+    assert above(-30.0, 40.0, 0.42 * 12.0).tree_m == pytest.approx(6.0, abs=0.01)
+    # Straight over the crown at 0.6 of its radius, where the dome is 0.8 of its height.
+    dome_m = 12.0 * (0.42 + 0.58 * 0.8)
+    assert above(-20.0, 42.4, dome_m - 0.05).tree_m == 0.0
+    assert 0.0 < above(-20.0, 42.4, dome_m + 0.1).tree_m < 0.12
     assert above(10.0, -43.0, 0.0).tree_m == pytest.approx(1.5)
     assert above(10.0, -40.0, 3.0).tree_m == pytest.approx(1.0)
 

@@ -5,7 +5,7 @@ import statistics
 
 import pytest
 
-from sitl.wind import Wind, gust_scales
+from sitl.wind import COVER_ROUGHNESS_M, Wind, gust_scales
 
 DT_S = 0.02
 
@@ -63,6 +63,24 @@ def test_the_mean_wind_grows_with_height_and_is_the_given_one_at_twenty_feet() -
     wind = Wind(5.0, seed=1)
     assert wind.mean_m_s(20 * 0.3048) == pytest.approx(5.0)
     assert wind.mean_m_s(2.0) < wind.mean_m_s(10.0) < wind.mean_m_s(50.0)
+
+
+@pytest.mark.parametrize("cover", list(COVER_ROUGHNESS_M))
+def test_the_profile_is_the_grounds(cover: str) -> None:
+    # u(z) / u(20 ft) = ln(z / z0) / ln(20 ft / z0), MIL-F-8785C; a rougher ground has more shear.
+    roughness_m = COVER_ROUGHNESS_M[cover]
+    wind = Wind(6.0, seed=1, roughness_m=roughness_m)
+    for height_m in (3.0, 10.0, 40.0):
+        wanted_m_s = 6.0 * math.log(height_m / roughness_m) / math.log(20 * 0.3048 / roughness_m)
+        assert wind.mean_m_s(height_m) == pytest.approx(wanted_m_s)
+    assert 0.0 < wind.mean_m_s(0.0) < wind.mean_m_s(3.0)
+
+
+def test_rougher_ground_has_more_shear() -> None:
+    rough_first = sorted(COVER_ROUGHNESS_M.values(), reverse=True)
+    shears = [wind.mean_m_s(40.0) / wind.mean_m_s(3.0) for wind in (Wind(6.0, 1, roughness_m=z) for z in rough_first)]
+    assert shears == sorted(shears, reverse=True)
+    assert shears[0] > 2 * shears[-1]
 
 
 def test_the_seed_decides() -> None:
