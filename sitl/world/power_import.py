@@ -58,10 +58,9 @@ def world_text(power_map: PowerMap, source: Path, start_support: int | None, rad
     known = [elevation for elevation in elevations if elevation is not None]
     origin = Origin(latitude_rad, longitude_rad, known[0] if known else 0.0)
 
-    main = _Laid(main.line, main.supports, tuple(_place(node, origin) for node in main.supports))
-    near = _within(main, radius_m, keep=support - 1)
-    others = [part for line in power_map.lines if line is not main.line for part in _lay(line, origin)]
-    kept = [piece for other in others if len((piece := _within(other, radius_m)).places) >= 2]
+    near = _within(_moved(main, origin), radius_m, keep=support - 1)
+    others = [_within(_moved(part, origin), radius_m) for part in laid if part is not main]
+    kept = [part for part in others if len(part.places) >= 2]
     lines = [near, *sorted(kept, key=lambda part: -part.length_m)][:_TOP_LINES]
     head = [
         f"# Written by lineflight world import from {source.name}: {len(lines)} lines within {radius_m:g} m.",
@@ -104,6 +103,11 @@ def _lay(line: MapLine, origin: Origin) -> list[_Laid]:
         for part in parts
         if len(part) >= 2
     ]
+
+
+def _moved(part: _Laid, origin: Origin) -> _Laid:
+    """The same supports, as seen from another origin."""
+    return _Laid(part.line, part.supports, tuple(_place(node, origin) for node in part.supports))
 
 
 def _within(part: _Laid, radius_m: float, keep: int | None = None) -> _Laid:
