@@ -6,6 +6,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
 
 from sitl.place import EARTH_RADIUS_M, Origin
 from sitl.world.file import load_world, read_world_file
@@ -120,6 +122,7 @@ def test_nodes_that_are_no_supports_do_not_hold_the_line(tmp_path: Path) -> None
     told = [support(point, power="pole") for point in ((0.0, 0.0), (0.0, 60.0), (0.0, 120.0))]
     assert len(imported(write(tmp_path, geojson(line, *told))).supports) == 3
     assert len(imported(write(tmp_path, geojson(line))).supports) == 4
+    assert len(imported(write(tmp_path, geojson(line, *told[:1]))).supports) == 4
 
 
 def test_ways_of_one_kind_are_joined_where_two_meet(tmp_path: Path) -> None:
@@ -144,6 +147,46 @@ def test_what_is_far_or_under_ground_is_left_out(tmp_path: Path) -> None:
     assert len(world.lines) == 1
     assert len(world.supports) == 2
     assert "1 cables under ground were left out" in world_text(read_power_map(path), path, None, 300.0)
+
+
+def test_a_long_span_is_pulled_tight_and_one_too_long_is_left_out(tmp_path: Path) -> None:
+    places = [(0.0, 0.0), (0.0, 200.0), (0.0, 750.0), (0.0, 900.0), (0.0, 2700.0), (0.0, 2900.0)]
+    world = imported(write(tmp_path, geojson(way(places, power="line", voltage="110000"))), 1, 4000.0)
+    for conductor in world.conductors:
+        east_m = conductor.points_ned_m[:, 1] - world.supports[0].base_ned_m[1]
+        assert east_m.max() < 901.0 or east_m.min() > 2699.0
+        if not conductor.is_shield:
+            assert float(conductor.points_ned_m[:, 2].max()) < -4.0
+    with pytest.raises(PowerMapError, match=r"after support 4 .* too long"):
+        imported(tmp_path / "map.geojson", 4, 4000.0)
+
+
+points = st.tuples(st.floats(-900, 900), st.floats(-900, 900))
+tags = st.fixed_dictionaries(
+    {"power": st.sampled_from(["line", "minor_line"])},
+    optional={
+        "voltage": st.sampled_from(["400", "13200", "110000;20000", "400000", "?"]),
+        "cables": st.sampled_from(["1", "2", "4", "5", "12", "many"]),
+        "wires": st.sampled_from(["single", "double", "quad", "fourfold"]),
+        "circuits": st.sampled_from(["1", "2", "4"]),
+    },
+)
+
+
+@settings(deadline=None, max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(ways=st.lists(st.tuples(st.lists(points, min_size=2, max_size=7), tags), min_size=1, max_size=4))
+def test_whatever_the_map_says_the_world_loads_or_a_sentence_tells_why(
+    tmp_path: Path, ways: list[tuple[list[tuple[float, float]], dict[str, str]]]
+) -> None:
+    path = write(tmp_path, geojson(*(way(line, **told) for line, told in ways)))
+    try:
+        world = imported(path, radius_m=3000.0)
+    except PowerMapError:
+        return
+    nose = np.array([math.cos(world.start_yaw_rad), math.sin(world.start_yaw_rad)])
+    bases = np.array([support.base_ned_m[:2] for support in world.line.supports])
+    middles = (bases[1:] + bases[:-1]) / 2
+    assert np.linalg.norm(middles - 15.0 * nose, axis=1).min() < 0.05
 
 
 def test_the_file_says_what_was_told_and_what_was_assumed(tmp_path: Path) -> None:
