@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -11,6 +12,7 @@ from sitl.world.file import DEFAULT_WORLD, WorldError, load_world, schema_text
 from sitl.world.light import LIGHT_NAMES, LIGHTS, LightName
 from sitl.world.records import Light
 
+PAGE = Path(__file__).parents[3] / "docs" / "worlds.md"
 SCHEMA = Path(__file__).parents[3] / "sitl" / "worlds" / "world.schema.json"
 WORLD = """\
 version: 2
@@ -54,6 +56,14 @@ def test_a_world_file_is_read_in_ned_and_radians(tmp_path: Path) -> None:
 def test_the_schema_on_disk_is_that_of_the_models() -> None:
     assert SCHEMA.read_text(encoding="utf-8") == schema_text(), "run make schema"
     assert {"lines", "terrain", "scattered_trees"} <= set(json.loads(schema_text())["properties"])
+
+
+def test_the_example_of_the_documents_is_a_world(tmp_path: Path) -> None:
+    (example,) = re.findall(r"```yaml\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.S)
+    world = load_world(write(tmp_path, example))
+    assert world.trees
+    assert world.buildings
+    assert world.light == LIGHTS["low_sun"]
 
 
 def test_the_sun_stands_where_it_says() -> None:
