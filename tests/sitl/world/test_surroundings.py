@@ -28,6 +28,7 @@ house_rows:
   - {strip: 1, setback_m: 5, every_m: 20, roofs: [tile, flat], seed: 3}
   - {strip: 2, setback_m: 5, every_m: 15, seed: 4}
 """
+FAR = "trees: [{kind: bush, place_ne_m: [5000, 5000], height_m: 1}]\n"
 BOUNDS = (-150.0, -220.0, 180.0, 220.0)
 
 
@@ -45,8 +46,8 @@ def test_scattered_trees_keep_clear(tmp_path: Path, density: float, keep_m: floa
     model = ScatterModel.model_validate(
         {"kinds": kinds, "density_per_ha": density, "keep_clear_m": keep_m, "keep_start_clear_m": 12, "seed": seed}
     )
-    trees = scatter_trees(model, BOUNDS, world.lines, [road], [house])
-    assert trees == scatter_trees(model, BOUNDS, world.lines, [road], [house])
+    trees = scatter_trees(model, BOUNDS, world.lines, [road], [house], "key")
+    assert trees == scatter_trees(model, BOUNDS, world.lines, [road], [house], "key")
     places = np.array([[t.north_m, t.east_m] for t in trees]).reshape(-1, 2)
     radii_m = np.array([t.crown_radius_m for t in trees])
     for conductor in world.conductors:
@@ -61,9 +62,9 @@ def test_trees_are_as_dense_as_asked(tmp_path: Path) -> None:
     world = world_of(tmp_path, LINE)
     model = ScatterModel.model_validate({"kinds": ["bush"], "density_per_ha": 50, "keep_clear_m": 0})
     n_wanted = 50 * (BOUNDS[2] - BOUNDS[0]) * (BOUNDS[3] - BOUNDS[1]) / 1e4
-    assert len(scatter_trees(model, BOUNDS, world.lines, [], [])) == pytest.approx(n_wanted, rel=0.1)
+    assert len(scatter_trees(model, BOUNDS, world.lines, [], [], "key")) == pytest.approx(n_wanted, rel=0.1)
     area = AreaModel(south_m=0, west_m=0, north_m=100, east_m=100)
-    trees = scatter_trees(model.model_copy(update={"area": area}), BOUNDS, [], [], [])
+    trees = scatter_trees(model.model_copy(update={"area": area}), BOUNDS, [], [], [], "key")
     assert len(trees) == pytest.approx(50, abs=8)
     assert all(0 <= t.north_m <= 100 and 0 <= t.east_m <= 100 for t in trees)
 
@@ -120,7 +121,12 @@ def test_what_is_listed_stands_where_it_says(tmp_path: Path) -> None:
         ("trees: [{kind: palm, place_ne_m: [20, -30], height_m: 14}]\n", "trees.0.kind"),
         ("house_rows: [{strip: 1}]\n", "the whole file"),
         ("scattered_trees: [{kinds: [bush], density_per_ha: 9, height_m: [3, 2]}]\n", "scattered_trees.0"),
+        (
+            "scattered_trees: [{kinds: [bush], density_per_ha: 2000}]\nterrain: {kind: flat}\n" + FAR,
+            "scattered_trees.0",
+        ),
         ("strips: [{kind: road, points_ne_m: [[0, 0]]}]\n", "strips.0.points_ne_m"),
+        ("strips: [{kind: road, points_ne_m: [[0, 0], []]}]\n", "strips.0.points_ne_m.1.0"),
         ("terrain: {kind: hills, amplitude_m: 5}\n", "terrain.wavelength_m"),
     ],
 )
