@@ -78,10 +78,8 @@ def import_map(
         loaded = load_world(str(out))
     except WorldError as error:
         _fail(f"{error} It is kept for mending.")
-    n_supports = len(loaded.supports)
-    typer.echo(
-        f"{out}: {len(loaded.lines)} lines on {n_supports} supports; look at it with lineflight world show {out}"
-    )
+    lines = "1 line" if len(loaded.lines) == 1 else f"{len(loaded.lines)} lines"
+    typer.echo(f"{out}: {lines} on {len(loaded.supports)} supports")
 
 
 def _print_world(model: "WorldModel", world: "World", console: "Console") -> None:

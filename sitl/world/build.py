@@ -48,8 +48,8 @@ def build_world(name: str, model: WorldModel, folder: Path, light: LightName | N
     check_clearances(lines, terrain, buildings, trees)
     for row in model.house_rows:
         buildings += build_row(row, strips, lines, buildings)
-    for scatter in model.scattered_trees:
-        trees += scatter_trees(scatter, terrain.bounds_ne_m, lines, strips, buildings)
+    for i, scatter in enumerate(model.scattered_trees):
+        trees += scatter_trees(scatter, terrain.bounds_ne_m, lines, strips, buildings, f"scattered_trees.{i}")
     return World(
         name=name,
         origin=origin,

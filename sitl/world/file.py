@@ -37,7 +37,7 @@ def load_world(name_or_path: str | None = None, light: LightName | None = None) 
     try:
         return build_world(path.stem, model, path.parent, light)
     except WrongKey as error:
-        raise WorldError(f"The world file {where} is wrong at {error.key}: {error}.") from error
+        raise WorldError(f"The world file {where} is wrong at {error.key}: {str(error).rstrip('.')}.") from error
 
 
 def read_world_file(where: str) -> WorldModel:
@@ -49,7 +49,7 @@ def read_world_file(where: str) -> WorldModel:
         raise WorldError(
             f"There is no world '{where}': give the path of a world file or one of these names: {known}."
         ) from None
-    except (OSError, UnicodeDecodeError) as error:
+    except (OSError, ValueError) as error:
         raise WorldError(f"The world file {where} cannot be read as text: {error}.") from error
     data = None
     try:
@@ -64,6 +64,8 @@ def read_world_file(where: str) -> WorldModel:
         key = ".".join(_key(first["loc"], data)) or "the whole file"
         message = first["msg"].removeprefix("Value error, ")
         raise WorldError(f"The world file {where} is wrong at {key}: {message}.") from error
+    except (ValueError, RecursionError) as error:  # a date that is none, or brackets without end
+        raise WorldError(f"The world file {where} has a value that cannot be read: {error}.") from error
 
 
 def schema_text() -> str:
@@ -82,8 +84,12 @@ def _key(location: tuple[int | str, ...], data: object) -> list[str]:
         if isinstance(data, dict) and part not in data and part == data.get("kind"):
             continue
         parts.append(str(part))
-        is_there = (isinstance(data, dict) and part in data) or (isinstance(data, list) and isinstance(part, int))
-        data = data[part] if is_there else None  # type: ignore[index]
+        if isinstance(data, dict):
+            data = data.get(part)
+        elif isinstance(data, list) and isinstance(part, int) and part < len(data):
+            data = data[part]
+        else:
+            data = None
     return parts
 
 

@@ -45,10 +45,9 @@ def read_height_map(model: HeightMapModel, over: HeightGrid, origin: Origin, fol
             _KEY,
             f"{path.name} does not reach over the world: {south} m to {north} m north and {west} m to {east} m east",
         )
-    maps = np.meshgrid(x.astype(np.float32), y.astype(np.float32))
     # Heights are taken from their own level: float32 keeps millimetres only near 0.
     level_m = np.float32(np.nanmedian(up_m))
-    sampled = cv2.remap(up_m - level_m, maps[0], maps[1], cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
+    sampled = _smooth(_smooth(up_m - level_m, y).T, x).T
     if not np.isfinite(sampled).all():
         raise WrongKey(_KEY, f"{path.name} has pixels without a height within the world")
     return HeightGrid(over.south_m, over.west_m, over.cell_m, model.scale_m * sampled)
@@ -61,13 +60,23 @@ def _read(path: Path) -> tuple[NDArray[np.float32], GeoPlace | None]:
         if path.suffix.lower() == ".npy":
             pixels = np.load(path, allow_pickle=False)
         else:
-            pixels = cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+            pixels = _read_picture(path)
             place = read_place(path)
     except (ValueError, EOFError, OSError, cv2.error) as error:
         raise WrongKey(_KEY, f"{path.name} cannot be used: {error}") from error
     if pixels is None or pixels.dtype.kind not in "uif" or pixels.ndim != 2 or min(pixels.shape) < 2:
         raise WrongKey(_KEY, f"{path.name} is no grey picture or array of heights of 2 x 2 pixels or more")
     return np.asarray(pixels, dtype=np.float32), place
+
+
+def _read_picture(path: Path) -> NDArray[np.generic] | None:
+    """The pixels as they are in the file; OpenCV's warnings of GeoTIFF's tags are kept from the console."""
+    before = cv2.utils.logging.getLogLevel()
+    cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_ERROR)
+    try:
+        return cv2.imread(str(path), cv2.IMREAD_UNCHANGED)
+    finally:
+        cv2.utils.logging.setLogLevel(before)
 
 
 def _pixels_on_earth(
@@ -80,3 +89,16 @@ def _pixels_on_earth(
         (place.latitude_deg - latitudes) / place.south_step_deg,
         (longitudes - place.longitude_deg) / place.east_step_deg,
     )
+
+
+def _smooth(values: NDArray[np.float32], places: NDArray[np.float64]) -> NDArray[np.float32]:
+    """The rows of `values` (n, m) at `places` (k,), counted in rows, by cubic convolution; (k, m).
+
+    Source: Keys 1981, "Cubic convolution interpolation for digital image processing", with a = -1/2. The slope has no
+    step at a row, as it would have between straight pieces: a coarse map would look like facets.
+    """
+    before = np.minimum(np.floor(places).astype(np.int64), len(values) - 1)
+    part = (places - before).astype(np.float32)[:, None]
+    last = len(values) - 1
+    a, b, c, d = (values[np.clip(before + step, 0, last)] for step in (-1, 0, 1, 2))
+    return np.asarray(b + 0.5 * part * (c - a + part * (2 * a - 5 * b + 4 * c - d + part * (3 * (b - c) + d - a))))

@@ -80,7 +80,10 @@ class TowerModel(Model):
     )
     base_width_m: float | None = Field(None, gt=0.5, le=20, description="By default 0.17 of the height.")
     arm_m: float | None = Field(
-        None, gt=1, le=20, description="How far the longest arm reaches from the axis; by default 0.15 of the height."
+        None,
+        gt=1,
+        le=20,
+        description="How far the longest arm reaches from the axis; by default 0.15 of the height for one conductor.",
     )
     level_m: float | None = Field(
         None, gt=1, le=12, description="From one level to the next; by default 0.14 of the height."

@@ -2,6 +2,7 @@
 
 import json
 import math
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -135,11 +136,12 @@ def _is_overhead(tags: Mapping[str, str]) -> bool:
 def _join(lines: list[MapLine]) -> list[MapLine]:
     """Join ways of the same kind where just two of them meet: maps cut lines wherever a tag changes."""
     left = [line for line in lines if len(line.nodes) >= 2]
+    n_ends = Counter(node.key for line in left for node in (line.nodes[0], line.nodes[-1]))
     joined: list[MapLine] = []
     while left:
         line = left.pop(0)
         for _ in ("at its end", "at its beginning"):
-            while (other := _next_of(line, left)) is not None:
+            while (other := _next_of(line, left, n_ends)) is not None:
                 left.remove(other)
                 nodes = other.nodes if other.nodes[0].key == line.nodes[-1].key else other.nodes[::-1]
                 line = MapLine((*line.nodes, *nodes[1:]), line.tags)
@@ -148,13 +150,11 @@ def _join(lines: list[MapLine]) -> list[MapLine]:
     return joined
 
 
-def _next_of(line: MapLine, others: list[MapLine]) -> MapLine | None:
-    """The one other way of its kind that begins or ends where this one ends."""
+def _next_of(line: MapLine, others: list[MapLine], n_ends: Counter[tuple[float, float]]) -> MapLine | None:
+    """The other way of its kind that begins or ends where this one ends, unless more do."""
     end = line.nodes[-1].key
-    if end == line.nodes[0].key:
-        return None
     near = [other for other in others if end in (other.nodes[0].key, other.nodes[-1].key)]
-    if len(near) != 1 or _kind(near[0].tags) != _kind(line.tags):
+    if len(near) != 1 or n_ends[end] != 2 or _kind(near[0].tags) != _kind(line.tags):
         return None
     return near[0]
 

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from sitl.world.errors import WrongKey
 from sitl.world.extent import distances_m, distances_to_building_m
 from sitl.world.models import ScatterModel
 from sitl.world.records import Building, PowerLine, Strip, Tree, TreeKind
@@ -17,6 +18,7 @@ _HEIGHTS_M: dict[TreeKind, tuple[float, float]] = {
     "bush": (0.8, 2.5),
 }
 _RADIUS_PER_HEIGHT: dict[TreeKind, float] = {"broadleaf": 0.32, "conifer": 0.16, "poplar": 0.11, "bush": 0.6}
+_MOST_TREES = 100_000
 _ROOM_M = 1.0  # to walls and to what runs over the ground
 
 
@@ -31,12 +33,19 @@ def scatter_trees(
     lines: Sequence[PowerLine],
     strips: Sequence[Strip],
     buildings: Sequence[Building],
+    key: str,
 ) -> tuple[Tree, ...]:
-    """Trees over `bounds_ne_m` (south, west, north, east), or the model's area, except where they must not stand."""
+    """Trees over `bounds_ne_m` (south, west, north, east), or the model's area, except where they must not stand.
+
+    `key` is the model's in the file, for the error. Raises WrongKey for more trees than a world has room for.
+    """
     south, west, north, east = bounds_ne_m
     if model.area is not None:
         south, west = max(south, model.area.south_m), max(west, model.area.west_m)
         north, east = min(north, model.area.north_m), min(east, model.area.east_m)
+    n_wanted = max(0.0, north - south) * max(0.0, east - west) / 1e4 * model.density_per_ha
+    if n_wanted > _MOST_TREES:
+        raise WrongKey(key, f"that makes {n_wanted:.0f} trees, more than {_MOST_TREES}; thin them out or give an area")
     rng = np.random.default_rng(model.seed)
     places = _places(rng, (south, west, north, east), 100.0 / math.sqrt(model.density_per_ha))
     n = len(places)

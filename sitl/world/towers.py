@@ -28,7 +28,7 @@ def build_tower(
     """
     height_m = tower.height_m
     level_m = tower.level_m or 0.14 * height_m
-    reach_m = tower.arm_m or 0.15 * height_m
+    reach_m = tower.arm_m or 0.15 * height_m * _widening(tower, n_conductors)
     base_m = 0.5 * (tower.base_width_m or 0.17 * height_m)
     cage_m = min(0.5 * base_m, 0.025 * height_m + 0.1)
     tall = _levels(tower, n_conductors, level_m, reach_m)
@@ -53,6 +53,11 @@ def build_tower(
     ]
     shield_holds = tuple(Hold(peak_m, height_m, height_m) for peak_m in peaks[:n_shield])
     return Structure(tuple(_place(bar, stand, up_at) for bar in bars), tuple(holds), shield_holds)
+
+
+def _widening(tower: TowerModel, n_conductors: int) -> float:
+    """How much longer arms are that carry several conductors side by side."""
+    return 1.0 + 0.6 * (n_conductors // 2 - 1) if tower.head == "one_level" else 1.0
 
 
 def _levels(

@@ -1,15 +1,19 @@
 """The world file is checked, and the world it describes is where it says."""
 
+import json
 import math
+import re
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from sitl.world.file import DEFAULT_WORLD, WorldError, load_world
+from sitl.world.file import DEFAULT_WORLD, WorldError, load_world, schema_text
 from sitl.world.light import LIGHT_NAMES, LIGHTS, LightName
 from sitl.world.records import Light
 
+PAGE = Path(__file__).parents[3] / "docs" / "worlds.md"
+SCHEMA = Path(__file__).parents[3] / "sitl" / "worlds" / "world.schema.json"
 WORLD = """\
 version: 2
 origin: {latitude_deg: 4.9, longitude_deg: -73.9, altitude_m: 2580}
@@ -47,6 +51,19 @@ def test_a_world_file_is_read_in_ned_and_radians(tmp_path: Path) -> None:
     assert body.end_ned_m == world.supports[1].top_ned_m
     assert arm.start_ned_m == pytest.approx((10.95, 10.0, -9.65))
     assert insulator.end_ned_m == pytest.approx((9.2, 10.0, -9.9))
+
+
+def test_the_schema_on_disk_is_that_of_the_models() -> None:
+    assert SCHEMA.read_text(encoding="utf-8") == schema_text(), "run make schema"
+    assert {"lines", "terrain", "scattered_trees"} <= set(json.loads(schema_text())["properties"])
+
+
+def test_the_example_of_the_documents_is_a_world(tmp_path: Path) -> None:
+    (example,) = re.findall(r"```yaml\n(.*?)```", PAGE.read_text(encoding="utf-8"), re.S)
+    world = load_world(write(tmp_path, example))
+    assert world.trees
+    assert world.buildings
+    assert world.light == LIGHTS["low_sun"]
 
 
 def test_the_sun_stands_where_it_says() -> None:

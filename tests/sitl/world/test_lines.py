@@ -229,10 +229,10 @@ def test_a_hot_day_shows_in_the_line(tmp_path: Path) -> None:
          "conductors": {"wire": "penguin", "tension_n": 6000}}
     )  # fmt: skip
     laid = stands(line, "lines.0", 0.0)
-    sags = [
-        max(sags_m(laid, [(0, 2)], line.conductors.model_copy(update={"temperature_c": t})))
-        for t in (-10.0, 15.0, 60.0)
-    ]
+    sags = []
+    for temperature_c in (-10.0, 15.0, 60.0):
+        hung = line.conductors.model_copy(update={"temperature_c": temperature_c})
+        sags.append(max(sags_m(laid, [(0, 2)], hung)))
     assert sags[0] < sags[1] < sags[2]
     assert sags[1] == pytest.approx(90.0**2 * 0.433 * 9.80665 / (8 * 6000), rel=1e-3)
 
