@@ -1,11 +1,9 @@
 """Builds one power line of a world file: supports on their ground, with conductors, shield wires and insulators."""
 
-import itertools
 import math
 from collections.abc import Sequence
 from dataclasses import replace
 
-from sitl.world.errors import WrongKey
 from sitl.world.height_grid import HeightGrid
 from sitl.world.line_models import LineModel, TowerModel
 from sitl.world.poles import build_pole
@@ -19,17 +17,11 @@ from sitl.world.towers import build_tower
 def build_line(line: LineModel, on_level: Sequence[Stand], terrain: HeightGrid, key: str) -> PowerLine:
     """Build a line on its stands; `key` is its own in the file. Raises WrongKey when a conductor cannot hang."""
     stands = [replace(stand, up_m=terrain.at(*stand.place_ne_m)) for stand in on_level]
-    spans = list(itertools.pairwise(stands))
     structures = [_structure(line, stand, terrain) for stand in stands]
-    for structure in structures[:1]:
-        low_m = min(hold.wire_m for hold in structure.holds)
-        if low_m <= 0.0:
-            raise WrongKey(f"{key}.support", f"it holds its lowest conductor {low_m:.1f} m over the ground")
-    line_runs = runs(len(spans), line.missing_spans)
+    line_runs = runs(line.n_spans, line.missing_spans)
     conductors = []
-    n_conductors = len(structures[0].holds)
     offsets = bundle_offsets(line.conductors.n_bundle, line.conductors.bundle_spacing_m)
-    for k in range(n_conductors):
+    for k in range(line.conductors.n):
         for offset in offsets:
             holds = [structure.holds[k] for structure in structures]
             conductors += string_conductor(stands, line_runs, holds, line.conductors, f"{key}.conductors", offset)

@@ -77,7 +77,7 @@ def _start(main: _Laid, span: int, rough: Origin) -> tuple[Origin, float]:
 def _head(power_map: PowerMap, source: Path, origin: Origin, yaw_rad: float) -> list[str]:
     under = power_map.n_underground
     return [
-        f"# Written by lineflight world import from {source.name}; what each line's tags say, or do not, is above it.",
+        f"# Written by lineflight world import from {_plain(source.name)}; what the tags of each line say is above it.",
         *([f"# {under} cables under ground were left out."] if under else []),
         "# The map tells no ground: it is level here; terrain: may name a height map.",
         "version: 2",
@@ -146,7 +146,7 @@ def _line_text(part: _Laid) -> list[str]:
         comment = f"so tight that its span of {fitted.longest_m:.0f} m keeps off level ground"
     missing = ", ".join(str(span) for span in fitted.missing)
     return [
-        *(f"  # {reason}" for reason in found.reasons),
+        *(f"  # {_plain(reason)}" for reason in found.reasons),
         f"  - name: {_quoted(name[:100])}",
         "    points_ne_m:",
         *(f"      - [{north_m:.2f}, {east_m:.2f}]" for north_m, east_m in part.places),
@@ -173,4 +173,9 @@ def _turn_rad(before: PointNe, here: PointNe, after: PointNe) -> float:
 
 def _quoted(text: str) -> str:
     """Text as YAML takes it whatever is in it: JSON's way."""
-    return json.dumps(text, ensure_ascii=True)
+    return json.dumps(_plain(text), ensure_ascii=False)
+
+
+def _plain(text: str) -> str:
+    """Text in one line: a tag with a line break must not write keys of its own."""
+    return " ".join("".join(char if char.isprintable() else " " for char in text).split())

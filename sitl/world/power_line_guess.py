@@ -41,7 +41,7 @@ def guess(line: MapLine, supports: Sequence[MapNode]) -> Guess:
         reasons.append(f"{line.tags['wires']} wires: tag wires")
     else:
         n_bundle = 2 if is_tower and voltage_v >= _EXTRA_HIGH_V else 1
-        reasons.append(f"{n_bundle} wires in a conductor: assumed by the voltage")
+        reasons.append(f"{'double' if n_bundle == 2 else 'single'} wires: assumed by the voltage")
     wire = "sparrow" if voltage_v < _MEDIUM_V else "raven" if voltage_v < 30_000.0 else "penguin"
     if is_tower:
         wire = "hawk" if voltage_v < _EXTRA_HIGH_V else "drake"
@@ -61,6 +61,8 @@ def guess(line: MapLine, supports: Sequence[MapNode]) -> Guess:
 def _voltage(line: MapLine, supports: Sequence[MapNode], reasons: list[str]) -> float:
     voltage_v = number(line.tags.get("voltage"))
     if voltage_v is not None and voltage_v > 0.0:
+        if "kv" in line.tags["voltage"].lower():  # the map wants volts, but people write this, too
+            voltage_v *= 1000.0
         reasons.append(f"{voltage_v / 1000:g} kV: tag voltage")
         return voltage_v
     is_high = line.tags.get("power") == "line" and any(node.tags.get("power") == "tower" for node in supports)

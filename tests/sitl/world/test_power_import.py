@@ -11,6 +11,7 @@ from hypothesis import strategies as st
 
 from sitl.place import EARTH_RADIUS_M, Origin
 from sitl.world.file import load_world, read_world_file
+from sitl.world.light import LIGHTS
 from sitl.world.power_import import world_text
 from sitl.world.power_map import PowerMapError, number, read_power_map
 from sitl.world.records import World
@@ -147,6 +148,18 @@ def test_what_is_far_or_under_ground_is_left_out(tmp_path: Path) -> None:
     assert len(world.lines) == 1
     assert len(world.supports) == 2
     assert "1 cables under ground were left out" in world_text(read_power_map(path), path, None, 300.0)
+
+
+def test_no_tag_writes_keys_of_its_own(tmp_path: Path) -> None:
+    name = 'Línea 🗼 "A"\x7f\nlight: dusk\x85\ud800'
+    line = way(TOWERS, power="line", voltage="115 kV", name=name)
+    told = support(TOWERS[0], power="tower", **{"line:management": "split\nlight: dusk\n"})
+    path = tmp_path / "map.geojson"
+    path.write_text(json.dumps(geojson(line, told)), encoding="utf-8")
+    assert imported(path).light == LIGHTS["noon"]
+    (read,) = read_world_file(str(tmp_path / "world.yaml")).lines
+    assert read.name == 'Línea 🗼 "A" light: dusk'
+    assert read.support.kind == "lattice_tower"
 
 
 def test_a_long_span_is_pulled_tight_and_one_too_long_is_left_out(tmp_path: Path) -> None:
