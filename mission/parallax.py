@@ -7,50 +7,41 @@ passes more slowly than a conductor.
 import math
 from dataclasses import dataclass, field
 
-_MIN_WAY_M = 1.0
-_MIN_SIGHTS = 8
-_MIN_CORRELATION = 0.95
+_MIN_WAY_M = 1.2
+_JUMP = 0.2  # share of the assumed height: a line that jumps so far from one sight to the next is another one
 
 
 @dataclass(slots=True)
 class Parallax:
-    """A straight line fitted through (way across the line, distance to it as seen), by least squares.
+    """Adds up the vehicle's way across a line, and by how much the line seemed to come nearer meanwhile.
 
     `assumed_height_m` is the height that distances were worked out with (guidance.locate_line): a line `h` below seems
-    to be `assumed_height_m / h` times as far as it is.
+    to be `assumed_height_m / h` times as far as it is. The middle of a line moves when a conductor comes into view or
+    leaves it, so that only sights of as many conductors are compared.
     """
 
     assumed_height_m: float
-    _n: int = field(default=0, init=False)
-    _mean_way: float = field(default=0.0, init=False)
-    _mean_seen: float = field(default=0.0, init=False)
-    _way_way: float = field(default=0.0, init=False)
-    _way_seen: float = field(default=0.0, init=False)
-    _seen_seen: float = field(default=0.0, init=False)
-    _first_way_m: float = field(default=math.inf, init=False)
-    _last_way_m: float = field(default=-math.inf, init=False)
+    _way_m: float = field(default=0.0, init=False)
+    _nearer_m: float = field(default=0.0, init=False)
+    _last: tuple[float, float, int] | None = field(default=None, init=False)
 
-    def add(self, way_m: float, seen_m: float) -> None:
+    def add(self, way_m: float, seen_m: float, n_lines: int) -> None:
         """Take a sight: the vehicle is `way_m` along a heading, and the line seems to cross it `seen_m` ahead."""
-        self._n += 1
-        before_way, before_seen = way_m - self._mean_way, seen_m - self._mean_seen
-        self._mean_way += before_way / self._n
-        self._mean_seen += before_seen / self._n
-        self._way_way += before_way * (way_m - self._mean_way)
-        self._way_seen += before_way * (seen_m - self._mean_seen)
-        self._seen_seen += before_seen * (seen_m - self._mean_seen)
-        self._first_way_m, self._last_way_m = min(self._first_way_m, way_m), max(self._last_way_m, way_m)
+        last, self._last = self._last, (way_m, seen_m, n_lines)
+        if last is None or last[2] != n_lines:
+            return
+        if abs(seen_m - last[1]) > _JUMP * self.assumed_height_m:
+            self._way_m = self._nearer_m = 0.0
+            return
+        self._way_m += way_m - last[0]
+        self._nearer_m += last[1] - seen_m
 
     @property
     def height_m(self) -> float | None:
         """The height over the line [m]; infinite for one that does not come nearer.
 
-        None until the vehicle has moved far enough for it, or where the sights do not tell of one line.
+        None until the vehicle has moved far enough for it.
         """
-        if self._n < _MIN_SIGHTS or self._last_way_m - self._first_way_m < _MIN_WAY_M:
+        if self._way_m < _MIN_WAY_M:
             return None
-        slope = -self._way_seen / self._way_way
-        if slope <= 0.0:
-            return math.inf
-        correlation = slope * math.sqrt(self._way_way / self._seen_seen)
-        return self.assumed_height_m / slope if correlation >= _MIN_CORRELATION else None
+        return self.assumed_height_m * self._way_m / self._nearer_m if self._nearer_m > 0.0 else math.inf

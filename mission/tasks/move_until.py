@@ -8,9 +8,6 @@ from mission.parallax import Parallax
 from mission.tasks.odometer import NEARLY_M, Odometer
 from mission.tasks.task import FlightMemory, Observation, Sight, Step, is_there
 
-_SAME_LINE_M = 1.0
-"""A line that seems to jump further from one sight to the next is another one."""
-
 
 class MoveUntilTask:
     """Flies along theta_0 until n frames in a row show the line.
@@ -41,7 +38,6 @@ class MoveUntilTask:
         self._n_in_a_row = 0
         self._blind_s = 0.0
         self._goal_m: float | None = None
-        self._seen_m: float | None = None
         self._parallax = Parallax(guidance.height_over_line_m)
         self._is_sure = False
         memory.known_line.forget()
@@ -115,12 +111,8 @@ class MoveUntilTask:
         seen_m = line.crossing_m(sight.north_m, sight.east_m, heading_rad)
         if seen_m is None:
             return False
-        if self._seen_m is not None and abs(seen_m - self._seen_m) > _SAME_LINE_M:
-            self._parallax = Parallax(self._guidance.height_over_line_m)
-            self._is_sure = False
-        self._seen_m = seen_m
         way_m = sight.north_m * math.cos(heading_rad) + sight.east_m * math.sin(heading_rad)
-        self._parallax.add(way_m, seen_m)
+        self._parallax.add(way_m, seen_m, 0 if sight.estimate is None else sight.estimate.n_lines)
         height_m = self._parallax.height_m
         if height_m is None:
             return True
