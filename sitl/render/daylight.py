@@ -133,22 +133,21 @@ def shade_nodes(
             slope_e = (up_m[i, east] - up_m[i, west]) / ((east - west) * cell_m)
             steep = 1.0 / math.sqrt(1.0 + slope_n * slope_n + slope_e * slope_e)
             cosine = max(0.0, (sun[2] - slope_n * sun[0] - slope_e * sun[1]) * steep)
-            hollow = max(0.0, wide_m[i, j] - up_m[i, j])
-            pit = max(0.0, near_m[i, j] - up_m[i, j])
-            sky = 0.5 * (1.0 + steep) / (1.0 + 0.28 * hollow) / (1.0 + 1.1 * pit)
+            hollow = min(6.0, max(0.0, wide_m[i, j] - up_m[i, j]))
+            pit = min(0.6, max(0.0, near_m[i, j] - up_m[i, j]))
+            sky = 0.08 + 0.46 * (1.0 + steep) / (1.0 + 0.22 * hollow) / (1.0 + 0.8 * pit)
             shares[i, j, 0] = int(255.0 * min(1.0, cosine * open_sun[i, j]) + 0.5)
             shares[i, j, 1] = int(255.0 * min(1.0, sky) + 0.5)
 
 
 @njit(nogil=True, cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
-def sky_bgr(day: NDArray[np.float32], north: float, east: float, up: float, out: NDArray[np.float32]) -> None:
-    """Write the sky's radiance in a direction (a unit vector) into `out` (3,); `day` is Daylight.table."""
-    up = max(0.0, up)
-    t = 1.0 - up
-    t *= t * t
-    toward = max(0.0, north * day[5, 0] + east * day[5, 1] - up * day[5, 2])
+def sky_mix(day: NDArray[np.float32], north: float, east: float, up: float) -> tuple[float, float]:
+    """How much of the horizon's and of the sun's glow is in the sky's radiance in a direction (a unit vector).
+
+    The radiance is zenith + (horizon - zenith) first + glow second; `day` is Daylight.table, which has all three.
+    """
+    t = 1.0 - max(0.0, up)
+    toward = max(0.0, north * day[5, 0] + east * day[5, 1] - max(0.0, up) * day[5, 2])
     near = toward * toward
     near *= near
-    glow = near * (0.5 + 0.5 * near * near)
-    for c in range(3):
-        out[c] = day[3, c] + t * (day[2, c] - day[3, c]) + glow * day[4, c]
+    return t * t * t, near * (0.5 + 0.5 * near * near)

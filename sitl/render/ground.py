@@ -7,8 +7,8 @@ import numpy as np
 from numba import njit
 from numpy.typing import NDArray
 
-from sitl.render.daylight import Daylight, sky_bgr
-from sitl.render.paint import DETAIL_TEXEL_M, GroundTexture
+from sitl.render.daylight import Daylight, sky_mix
+from sitl.render.paint import GroundTexture
 from sitl.render.relief import COARSE_PX, Relief, find_inverse_depth
 from sitl.render.texture import Texture, dither, map_texture
 
@@ -22,7 +22,6 @@ _GREY = (128.0, 128.0, 128.0, 128.0)
 
 @njit(nogil=True, cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
 def light_at(
-    out: NDArray[np.float32],
     w: float,
     rx: float,
     ry: float,
@@ -31,25 +30,27 @@ def light_at(
     shares: NDArray[np.uint8],
     place: NDArray[np.float64],
     day: NDArray[np.float32],
-) -> None:
-    """Write into `out` (6,) what a pixel multiplies its albedo by, and what comes on top: BGR each.
+) -> tuple[float, float, float, float, float, float]:
+    """What a pixel multiplies its albedo by, and what comes on top: BGR each.
 
     The pixel's inverse depth is `w` [1/m] and its ray (`rx`, `ry`, 1) in the camera frame; `centre` and `r` are the
     camera's position and rotation; `shares` is daylight.light_map's, on the grid at `place`; `day` is Daylight.table.
     """
-    north, east, down = (
-        r[0, 0] * rx + r[0, 1] * ry + r[0, 2],
-        r[1, 0] * rx + r[1, 1] * ry + r[1, 2],
-        r[2, 0] * rx + r[2, 1] * ry + r[2, 2],
-    )
-    length = math.sqrt(north * north + east * east + down * down)
+    north = r[0, 0] * rx + r[0, 1] * ry + r[0, 2]
+    east = r[1, 0] * rx + r[1, 1] * ry + r[1, 2]
+    down = r[2, 0] * rx + r[2, 1] * ry + r[2, 2]
+    square = north * north + east * east
+    length = math.sqrt(square + down * down)
     if w <= 1e-6:
-        sky_bgr(day, north / length, east / length, -down / length, out[3:])
-        out[0] = out[1] = out[2] = 0.0
-        return
+        rim, glow = sky_mix(day, north / length, east / length, -down / length)
+        b = day[3, 0] + rim * (day[2, 0] - day[3, 0]) + glow * day[4, 0]
+        g = day[3, 1] + rim * (day[2, 1] - day[3, 1]) + glow * day[4, 1]
+        red = day[3, 2] + rim * (day[2, 2] - day[3, 2]) + glow * day[4, 2]
+        return 0.0, 0.0, 0.0, b, g, red
     depth = 1.0 / w
-    y = (centre[0] + depth * north - place[0]) / place[2]
-    x = (centre[1] + depth * east - place[1]) / place[2]
+    per_cell = 1.0 / place[2]
+    y = (centre[0] + depth * north - place[0]) * per_cell
+    x = (centre[1] + depth * east - place[1]) * per_cell
     last_row, last_column = shares.shape[0] - 1, shares.shape[1] - 1
     if y < 0.0 or y >= last_row:
         y = abs(y) % (2.0 * last_row)
@@ -60,18 +61,25 @@ def light_at(
     i, j = min(int(y), last_row - 1), min(int(x), last_column - 1)
     v, u = y - i, x - j
     a, b, c, d = (1.0 - v) * (1.0 - u), (1.0 - v) * u, v * (1.0 - u), v * u
-    sun = (
-        a * shares[i, j, 0] + b * shares[i, j + 1, 0] + c * shares[i + 1, j, 0] + d * shares[i + 1, j + 1, 0]
-    ) / 255.0
-    sky = (
-        a * shares[i, j, 1] + b * shares[i, j + 1, 1] + c * shares[i + 1, j, 1] + d * shares[i + 1, j + 1, 1]
-    ) / 255.0
-    clear = math.exp(-day[6, 0] * depth * length)
-    flat = math.sqrt(north * north + east * east) + 1e-9
-    sky_bgr(day, north / flat, east / flat, 0.0, out[3:])
-    for k in range(3):
-        out[k] = clear * (sun * day[0, k] + sky * day[1, k])
-        out[3 + k] *= 1.0 - clear
+    sun = a * shares[i, j, 0] + b * shares[i, j + 1, 0] + c * shares[i + 1, j, 0] + d * shares[i + 1, j + 1, 0]
+    sky = a * shares[i, j, 1] + b * shares[i, j + 1, 1] + c * shares[i + 1, j, 1] + d * shares[i + 1, j + 1, 1]
+    haze = day[6, 0] * depth * length
+    clear = math.exp(-haze) if haze > 0.05 else 1.0 - haze + 0.5 * haze * haze
+    sun *= clear / 255.0
+    sky *= clear / 255.0
+    dim = 1.0 - clear
+    glow = 0.0
+    if dim > 0.01:  # the air towards the sun is brighter
+        flat = 1.0 / math.sqrt(square + 1e-12)
+        glow = sky_mix(day, north * flat, east * flat, 0.0)[1]
+    return (
+        sun * day[0, 0] + sky * day[1, 0],
+        sun * day[0, 1] + sky * day[1, 1],
+        sun * day[0, 2] + sky * day[1, 2],
+        dim * (day[2, 0] + glow * day[4, 0]),
+        dim * (day[2, 1] + glow * day[4, 1]),
+        dim * (day[2, 2] + glow * day[4, 2]),
+    )
 
 
 @njit(nogil=True, cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
@@ -85,78 +93,90 @@ def light_grid(
     place: NDArray[np.float64],
     day: NDArray[np.float32],
 ) -> None:
-    """Fill `grid` (rows, columns, 6) float32 with light_at() for every LIGHT_PX-th pixel of `inverse`."""
-    for i in range(grid.shape[0]):
-        for j in range(grid.shape[1]):
+    """Fill `grid` (6, rows, columns) float32 with light_at() for every LIGHT_PX-th pixel of `inverse`."""
+    for i in range(grid.shape[1]):
+        for j in range(grid.shape[2]):
             v, u = i * LIGHT_PX, j * LIGHT_PX
-            light_at(grid[i, j], inverse[v, u], rays[0, v, u], rays[1, v, u], centre, r, shares, place, day)
+            shine = light_at(inverse[v, u], rays[0, v, u], rays[1, v, u], centre, r, shares, place, day)
+            grid[0, i, j], grid[1, i, j], grid[2, i, j] = shine[0], shine[1], shine[2]
+            grid[3, i, j], grid[4, i, j], grid[5, i, j] = shine[3], shine[4], shine[5]
 
 
 @njit(nogil=True, cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
 def light_ground(
     light: NDArray[np.float32],
-    surface: NDArray[np.uint8],
-    detail: NDArray[np.uint8],
+    surface: NDArray[np.int32],
+    detail: NDArray[np.int32],
     detail_rows: tuple[int, int],
     grid: NDArray[np.float32],
     is_edge: NDArray[np.uint8],
     inverse: NDArray[np.float32],
-    rays: NDArray[np.float32],
-    centre: NDArray[np.float64],
-    r: NDArray[np.float64],
-    shares: NDArray[np.uint8],
-    place: NDArray[np.float64],
-    day: NDArray[np.float32],
 ) -> None:
-    """Bring surface and detail, (height, width, 4) uint8 each, and their light into `light` (height, width, 3) float32.
+    """Bring surface and detail, and the light on them, into `light` (height, width, 3) float32 linear BGR.
 
-    `detail` counts in `detail_rows` (first, last) only. `grid` is light_grid's, used between its places but where
-    `is_edge` tells that depths jump; there light_at() is asked for every pixel, with the rest of what it takes.
+    `surface` and `detail` are (height, width) int32, the four channels of a pixel in one number, the first lowest: so
+    the loops become vector instructions. `detail` counts in `detail_rows` (first, last) only. `grid` is light_grid's, mixed between its places; but where
+    `is_edge` tells that depths jump, a pixel takes the light of the place whose `inverse` depth is most like its own.
     """
     unit, two, three, one, zero = np.float32(1 / 255), np.float32(2), np.float32(3), np.float32(1), np.float32(0)
+    middle = np.float32(127.5)
     tinge, half, quarter = np.float32(_HUE), np.float32(0.5), np.float32(1.0 / LIGHT_PX)
     height_px, width_px = light.shape[0], light.shape[1]
-    here = np.empty(6, dtype=np.float32)
-    row = np.empty((6, grid.shape[1]), dtype=np.float32)
-    shine = np.empty((6, grid.shape[1] * LIGHT_PX), dtype=np.float32)
+    n = grid.shape[2]
+    row = np.empty(n, dtype=np.float32)
+    shine = np.empty((6, n * LIGHT_PX), dtype=np.float32)
+    gain, tint = np.ones(width_px, dtype=np.float32), np.zeros(width_px, dtype=np.float32)
+    lit = np.empty((3, width_px), dtype=np.float32)
+    byte, second, third, fourth = np.int32(255), np.int32(8), np.int32(16), np.int32(24)
     for v in range(height_px):
         i = v // LIGHT_PX
         part = np.float32(v - i * LIGHT_PX) * quarter
         for c in range(6):
-            for j in range(grid.shape[1]):
-                row[c, j] = grid[i, j, c] + part * (grid[i + 1, j, c] - grid[i, j, c])
-            for j in range(grid.shape[1] - 1):
-                step = (row[c, j + 1] - row[c, j]) * quarter
+            for j in range(n):
+                row[j] = grid[c, i, j] + part * (grid[c, i + 1, j] - grid[c, i, j])
+            for j in range(n - 1):
+                step = (row[j + 1] - row[j]) * quarter
                 for k in range(LIGHT_PX):
-                    shine[c, j * LIGHT_PX + k] = row[c, j] + np.float32(k) * step
+                    shine[c, j * LIGHT_PX + k] = row[j] + np.float32(k) * step
+        low, high = i * LIGHT_PX, (i + 1) * LIGHT_PX
         for j in range(is_edge.shape[1]):
             if is_edge[i, j]:
-                for u in range(j * LIGHT_PX, min(width_px, j * LIGHT_PX + LIGHT_PX)):
-                    light_at(here, inverse[v, u], rays[0, v, u], rays[1, v, u], centre, r, shares, place, day)
+                left, right = j * LIGHT_PX, (j + 1) * LIGHT_PX
+                for u in range(left, min(width_px, right)):
+                    w = inverse[v, u]
+                    best, x, y = np.inf, j, i
+                    for k in range(4):
+                        away = abs(inverse[high if k > 1 else low, right if k & 1 else left] - w)
+                        if away < best:
+                            best, x, y = away, j + (k & 1), i + (k >> 1)
                     for c in range(6):
-                        shine[c, u] = here[c]
+                        shine[c, u] = grid[c, y, x]
         if detail_rows[0] <= v <= detail_rows[1]:
             for u in range(width_px):
-                cover = three * unit * np.float32(surface[v, u, 3])
-                soil, grass = np.float32(detail[v, u, 0]), np.float32(detail[v, u, 1])
-                leaf, hue = np.float32(detail[v, u, 2]), np.float32(detail[v, u, 3])
+                four = detail[v, u]
+                cover = three * unit * np.float32((surface[v, u] >> fourth) & byte)
+                soil, grass = np.float32(four & byte), np.float32((four >> second) & byte)
+                leaf, hue = np.float32((four >> third) & byte), np.float32((four >> fourth) & byte)
                 grassy = min(one, max(zero, cover - one))
-                leafy = max(zero, cover - two)
                 grain = soil + grassy * (grass - soil)
+                leafy = max(zero, cover - two)
                 grain += leafy * (leaf - grain)
-                gain = unit * (one + min(one, cover) * (two * unit * grain - one))
-                tint = tinge * (hue * unit - half) * grassy
-                b = np.float32(surface[v, u, 0]) * gain * (one - tint)
-                g = np.float32(surface[v, u, 1]) * gain
-                r_ = np.float32(surface[v, u, 2]) * gain * (one + tint)
-                light[v, u, 0] = b * b * shine[0, u] + shine[3, u]
-                light[v, u, 1] = g * g * shine[1, u] + shine[4, u]
-                light[v, u, 2] = r_ * r_ * shine[2, u] + shine[5, u]
+                grain += leafy * (grain - middle)
+                gain[u] = unit * (one + min(one, cover) * (two * unit * grain - one))
+                tint[u] = tinge * (hue * unit - half) * grassy
         else:
-            for u in range(width_px):
-                for c in range(3):
-                    value = unit * np.float32(surface[v, u, c])
-                    light[v, u, c] = value * value * shine[c, u] + shine[3 + c, u]
+            gain[:] = unit
+            tint[:] = zero
+        for u in range(width_px):
+            four = surface[v, u]
+            b = np.float32(four & byte) * gain[u] * (one - tint[u])
+            g = np.float32((four >> second) & byte) * gain[u]
+            red = np.float32((four >> third) & byte) * gain[u] * (one + tint[u])
+            lit[0, u] = b * b * shine[0, u] + shine[3, u]
+            lit[1, u] = g * g * shine[1, u] + shine[4, u]
+            lit[2, u] = red * red * shine[2, u] + shine[5, u]
+        for u in range(width_px):
+            light[v, u, 0], light[v, u, 1], light[v, u, 2] = lit[0, u], lit[1, u], lit[2, u]
 
 
 class GroundView:
@@ -181,7 +201,7 @@ class GroundView:
         self._rays = widen(rays)
         n_rows, n_columns = self._rays.shape[1:]
         self.inverse = np.empty((n_rows, n_columns), dtype=np.float32)
-        self.shine = np.empty((n_rows // LIGHT_PX + 1, n_columns // LIGHT_PX + 1, 6), dtype=np.float32)
+        self.shine = np.empty((6, n_rows // LIGHT_PX + 1, n_columns // LIGHT_PX + 1), dtype=np.float32)
         self._marched = np.zeros((n_rows, n_columns), dtype=np.uint8)
         self._odd = np.zeros((n_rows // 2, n_columns // 2), dtype=np.float32)
         self._is_edge = np.zeros((n_rows // LIGHT_PX, n_columns // LIGHT_PX), dtype=np.uint8)
@@ -211,8 +231,9 @@ class GroundView:
         camera = (centre, ned_from_camera, self._shares, self._relief.place, self._day)
         light_grid(self.shine, self.inverse, self._rays, *camera)
         light_ground(
-            light, self._surface, self._detail, seen, self.shine, self._is_edge, self.inverse, self._rays, *camera
-        )
+            light, self._surface.view(np.int32)[..., 0], self._detail.view(np.int32)[..., 0], seen, self.shine,
+            self._is_edge, self.inverse,
+        )  # fmt: skip
 
     def _fetch(
         self,
@@ -235,10 +256,11 @@ class GroundView:
         )  # fmt: skip
         if first <= last:
             rows = slice(first, last + 1)
+            # Of grain, the nearest texel is as good as a mean of four.
+            how = cv2.INTER_NEAREST if texture.repeats else cv2.INTER_LINEAR
             cv2.remap(
-                texture.atlas, self._columns[rows], self._rows[rows], cv2.INTER_LINEAR, out[rows],
-                cv2.BORDER_CONSTANT, beyond,
-            )  # fmt: skip
+                texture.atlas, self._columns[rows], self._rows[rows], how, out[rows], cv2.BORDER_CONSTANT, beyond
+            )
         return int(first), int(last)
 
 
@@ -251,6 +273,3 @@ def widen(rays: NDArray[np.float32]) -> NDArray[np.float32]:
         steps = np.arange(1, more + 1, dtype=np.float32).reshape([-1 if k == axis else 1 for k in range(3)])
         rays = np.concatenate([rays, last + steps * (last - before)], axis=axis)
     return np.ascontiguousarray(rays, dtype=np.float32)
-
-
-__all__ = ["DETAIL_TEXEL_M", "LIGHT_PX", "GroundView", "light_at", "light_grid", "light_ground", "widen"]

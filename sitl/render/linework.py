@@ -18,6 +18,8 @@ _SUN_DIAMETER_RAD = math.radians(0.53)
 _FAINTEST = 0.05  # of the light on level ground: what the sun must bring before its shadows show
 _PER_OBJECT_M = 40.0
 _SPAN_M = 120.0
+_EVERY = 8
+_FINE_TO_M = 30.0  # from there on, a conductor in pieces of 4 m lies within a twentieth of a pixel
 _ALUMINIUM_BGR = (0.62, 0.61, 0.59)
 _GALVANISED_BGR = (0.50, 0.50, 0.49)
 _BGR: dict[Material, tuple[float, float, float]] = {
@@ -40,10 +42,11 @@ class Linework:
     """Objects that are drawn one after the other, each made of straight members and of discs on top of them.
 
     `members` (n, 9) and `discs` (m, 5) float64 are what sitl.render.projection's kernels take. For each object,
-    `spans` (k, 4) int64 tells its first member, the one after its last, and the same of its discs; `looks` (k, 13)
+    `spans` (k, 4) int64 tells its first member, the one after its last, and the same of its discs; `looks` (k, 16)
     float64 has (ambient, direct, gloss) in the day's light, its linear BGR, its kind (sitl.render.merge), the centre
-    NED [m] and the radius [m] of a ball round it, how deep [m] in the ground it still shows, and by how much [m] it
-    counts as nearer than what it is fixed to.
+    NED [m] and the radius [m] of a ball round it, how deep [m] in the ground it still shows, by how much [m] it
+    counts as nearer than what it is fixed to, from and up to what distance of the ball [m] it is drawn, and its largest
+    diameter [m].
     """
 
     members: NDArray[np.float64]
@@ -60,7 +63,7 @@ def build_linework(world: World, wire_at_least_m: float = 0.0) -> Linework:
     build = _Builder(world.light)
     sun_ned = np.array(world.light.direction_ned)
     bars = [member for support in world.supports for member in support.members]
-    wires = [rows for conductor in world.conductors for rows in _spans_of(conductor)]
+    wires = [_thinned(rows) for conductor in world.conductors for rows in _spans_of(conductor)]
     fences = fences_of(world.strips, world.terrain)
     if build.casts_shadows:
         lie = [cast_shadow(rows, sun_ned, world.terrain) for rows in (*wires, _rows(bars), *fences) if len(rows)]
@@ -70,7 +73,7 @@ def build_linework(world: World, wire_at_least_m: float = 0.0) -> Linework:
         for piece in _pieces(rows):
             build.add(piece, DECAL, bgr, slack_m=0.5)
     for rows in rails_of(world.strips, world.terrain):
-        build.add(rows, ROUND, (0.27, 0.29, 0.32), _SURFACE["steel"], slack_m=0.5)
+        build.add(rows, ROUND, (0.50, 0.50, 0.50), _SURFACE["steel"], slack_m=0.5)
     for rows in fences:
         build.add(rows, ROUND, _BGR["wood"], _SURFACE["wood"], slack_m=0.3)
     for support in world.supports:
@@ -82,7 +85,8 @@ def build_linework(world: World, wire_at_least_m: float = 0.0) -> Linework:
         bgr = _GALVANISED_BGR if conductor.is_shield else _ALUMINIUM_BGR
         for rows in _spans_of(conductor):
             rows[:, 6:8] = np.maximum(rows[:, 6:8], wire_at_least_m)
-            build.add(rows, ROUND, bgr, _WIRE, slack_m=0.1, nearer_m=0.05)
+            build.add(rows, ROUND, bgr, _WIRE, slack_m=0.1, nearer_m=0.05, to_m=_FINE_TO_M)
+            build.add(_thinned(rows), ROUND, bgr, _WIRE, slack_m=0.1, nearer_m=0.05, from_m=_FINE_TO_M)
     return build.linework()
 
 
@@ -115,6 +119,8 @@ class _Builder:
         tops: list[Member] | None = None,
         slack_m: float,
         nearer_m: float = 0.0,
+        from_m: float = -math.inf,
+        to_m: float = math.inf,
     ) -> None:
         """Add an object of members (n, 9)."""
         discs = [] if tops is None else _tops(tops, self._upright)
@@ -124,11 +130,12 @@ class _Builder:
         self._n += len(rows)
         ends = rows[:, :6].reshape(-1, 3)
         middle = (ends.min(axis=0) + ends.max(axis=0)) / 2.0
-        radius_m = float(np.linalg.norm(ends - middle, axis=1).max() + rows[:, 6:8].max())
+        widest_m = float(rows[:, 6:8].max())
+        radius_m = float(np.linalg.norm(ends - middle, axis=1).max()) + widest_m
         if kind == ROUND:
             bgr = tuple(float(b * t) for b, t in zip(bgr, self._tint, strict=True))
         light = (surface[0] * self._sky, surface[1] * self._sun, surface[2] * self._sun)
-        self._looks.append((*light, *bgr, float(kind), *middle, radius_m, slack_m, nearer_m))
+        self._looks.append((*light, *bgr, float(kind), *middle, radius_m, slack_m, nearer_m, from_m, to_m, widest_m))
 
     def linework(self) -> Linework:
         """What was collected."""
@@ -136,7 +143,7 @@ class _Builder:
             np.ascontiguousarray(np.concatenate([*self._members, np.empty((0, 9))]), dtype=np.float64),
             np.array(self._discs, dtype=np.float64).reshape(-1, 5),
             np.array(self._spans, dtype=np.int64).reshape(-1, 4),
-            np.array(self._looks, dtype=np.float64).reshape(-1, 13),
+            np.array(self._looks, dtype=np.float64).reshape(-1, 16),
         )
 
 
@@ -174,6 +181,14 @@ def _spans_of(conductor: Conductor) -> list[NDArray[np.float64]]:
         parts = max(1, math.ceil((come_m[last] - come_m[first]) / _SPAN_M))
         cuts += [first + (last - first) * k // parts for k in range(parts)]
     return [piece for piece in np.split(rows, [cut for cut in cuts if cut > 0]) if len(piece)]
+
+
+def _thinned(rows: NDArray[np.float64]) -> NDArray[np.float64]:
+    """The same run of members in longer ones, each in the place of up to _EVERY."""
+    firsts = rows[::_EVERY].copy()
+    lasts = np.append(np.arange(_EVERY, len(rows), _EVERY) - 1, len(rows) - 1)
+    firsts[:, 3:6], firsts[:, 7] = rows[lasts, 3:6], rows[lasts, 7]
+    return firsts
 
 
 def cast_shadow(

@@ -11,6 +11,7 @@ from sitl.render.projection import NEAR_M, draw_discs, draw_members
 
 ROUND, DECAL, SHADOW = 0, 1, 2
 """What an object is: round bars with a shading of their own, flat paint in the ground's light, or a lack of sun."""
+_THINNEST_PX = 0.02  # what is thinner everywhere is left out
 _SEEN_PART = 0.05  # a member that covers less of a pixel does not tell the pixel's depth
 
 
@@ -22,6 +23,7 @@ def arrange(
     centre: NDArray[np.float64],
     camera_from_ned: NDArray[np.float64],
     reach: NDArray[np.float64],
+    f_px: float,
 ) -> NDArray[np.int64]:
     """Which objects can be in view, in drawing order: shadows, what lies on the ground, then all else from afar.
 
@@ -39,6 +41,9 @@ def arrange(
         y = camera_from_ned[1, 0] * dn + camera_from_ned[1, 1] * de + camera_from_ned[1, 2] * dd
         z = camera_from_ned[2, 0] * dn + camera_from_ned[2, 1] * de + camera_from_ned[2, 2] * dd
         radius = looks[k, 10]
+        away = math.sqrt(x * x + y * y + z * z) - radius
+        if not looks[k, 13] <= away < looks[k, 14] or looks[k, 15] * f_px < _THINNEST_PX * away:
+            continue
         if (
             z + radius < NEAR_M
             or reach[0] * z - x > radius * edge[0]
@@ -100,7 +105,7 @@ def draw_linework(
     work in. `shine` is GroundView's; `air_bgr` and `extinction` [1/m] are the haze.
     """
     material, bgr = np.empty(3), np.empty(3)
-    for k in arrange(spans, looks, members, centre, camera_from_ned, reach):
+    for k in arrange(spans, looks, members, centre, camera_from_ned, reach, lens[0]):
         kind = int(looks[k, 6])
         for c in range(3):
             material[c], bgr[c] = looks[k, c], looks[k, 3 + c]
@@ -143,6 +148,7 @@ def merge_strips(
         length_px = math.hypot(x1 - x0, y1 - y0)
         if length_px < 1e-9:
             continue
+        clear = math.exp(-2.0 * extinction / (strips[s, 6] + strips[s, 7]))
         dx, dy = (x1 - x0) / length_px, (y1 - y0) / length_px
         is_flat = abs(dx) >= abs(dy)
         reach_px = 0.5 * max(strips[s, 2], strips[s, 5]) + 1.5
@@ -175,13 +181,12 @@ def merge_strips(
                     continue
                 if nearest.size and kind == ROUND and part >= _SEEN_PART:
                     nearest[v, u] = max(nearest[v, u], np.float32(w))
-                clear = math.exp(-extinction / w)
                 for c in range(3):
                     if kind == SHADOW:
                         light[v, u, c] *= np.float32(1.0 - min(1.0, bright) * clear * (1.0 - bgr[c]))
                     elif kind == DECAL:
                         y, x = v // LIGHT_PX, u // LIGHT_PX
-                        paint = bright * bgr[c] * shine[y, x, c] + part * shine[y, x, 3 + c]
+                        paint = bright * bgr[c] * shine[c, y, x] + part * shine[3 + c, y, x]
                         light[v, u, c] = np.float32(light[v, u, c] * (1.0 - part) + paint)
                     else:
                         paint = bright * bgr[c] * clear + part * air_bgr[c] * (1.0 - clear)

@@ -13,12 +13,14 @@ from sitl.world.height_grid import HeightGrid
 COARSE_PX = 8
 _LEAF_M = 1.0
 _MOST_LEVELS = 7
-_FARTHEST_M = 2500.0  # beyond, the world is a plane
+_FARTHEST_M = 1200.0  # beyond, the world is a plane
 # What part of the inverse depth two neighbours may disagree by, beyond what a smooth surface explains, before rays
 # are marched between them: the smallest for which a frame's rays suffice.
 _TOLERANCES = (0.02, 0.04, 0.08, 0.16, 0.32)
 _JUMP = 0.08
-_MOST_FINE = 3000  # rays a frame may spend on each finer grid
+_AROUND = 0.12  # of the depth: how far before and behind a thing's edge the thing may go on
+_NOTHING = -1e30
+_MOST_FINE = 8000  # rays a frame may spend on each finer grid
 _NEAREST_M = 0.05
 _FINE = 0.006  # of the depth: smaller things than that are less than two pixels of most cameras
 
@@ -132,15 +134,18 @@ def march(
     dn: float,
     de: float,
     du: float,
+    from_m: float,
+    to_m: float,
 ) -> float:
     """The inverse depth [1/m] at which a ray meets the surface; 0 or less where it meets the sky.
 
     The first arguments are Relief's. The ray starts at (`north_m`, `east_m`, `height_m`) and goes (`dn`, `de`, `du`)
-    for each metre of depth. Where it meets nothing within a few kilometres, it meets the plane at `far_m`.
+    for each metre of depth. Where it meets nothing within a kilometre, it meets the plane at `far_m`. Only depths
+    between `from_m` and `to_m` [m] are looked at; _NOTHING where the ray meets nothing there.
     """
     level_ground = -du / max(0.05, height_m - far_m)
     farthest = _FARTHEST_M / math.sqrt(dn * dn + de * de + du * du)
-    z, end = _NEAREST_M, farthest
+    z, end = max(_NEAREST_M, from_m), farthest
     if du < 0.0:
         z = max(z, (place[4] - height_m) / du)
         end = min(end, (place[3] - 0.01 - height_m) / du)
@@ -148,6 +153,8 @@ def march(
         return level_ground
     elif du > 0.0:
         end = min(end, (place[4] - height_m) / du)
+    is_part = to_m < end
+    end = min(end, to_m)
     a0, b0 = (north_m - place[0]) / leaf_m[0], (east_m - place[1]) / leaf_m[1]
     da, db = dn / leaf_m[0], de / leaf_m[1]
     per_a = 1.0 / da if abs(da) > 1e-9 else 1e9
@@ -204,6 +211,8 @@ def march(
             above = over
         z = out
         level = min(1, top)
+    if is_part:
+        return _NOTHING
     if end < farthest and du < 0.0:
         return 1.0 / max(_NEAREST_M, end)
     return min(level_ground, 1.0 / farthest)
@@ -257,7 +266,7 @@ def _mark_odd(
                         counts[k] += 1
             odd[i, j] = here
             if step == 4:
-                is_edge[i, j] = here >= _TOLERANCES[0]
+                is_edge[i, j] = here >= _JUMP
     for k in range(len(_TOLERANCES)):
         if 5 * counts[k] <= _MOST_FINE:
             return _TOLERANCES[k] if counts[k] > 0 else np.inf
@@ -325,7 +334,7 @@ def find_inverse_depth(
                 inverse[v, u] = march(
                     up_m, highest_m, levels, leaf_m, place, far_m, north_m, east_m, height_m,
                     r[0, 0] * x + r[0, 1] * y + r[0, 2], r[1, 0] * x + r[1, 1] * y + r[1, 2],
-                    -(r[2, 0] * x + r[2, 1] * y + r[2, 2]),
+                    -(r[2, 0] * x + r[2, 1] * y + r[2, 2]), 0.0, np.inf,
                 )  # fmt: skip
     step = COARSE_PX
     is_uneven = not is_flat
@@ -342,6 +351,14 @@ def find_inverse_depth(
                     if odd[i, j] < threshold:
                         continue
                     v, u = i * step, j * step
+                    corners = inverse[v, u], inverse[v, u + step], inverse[v + step, u], inverse[v + step, u + step]
+                    near, far = max(corners), min(corners)
+                    # Something near stands before something far: only what is near is looked for, and what it leaves
+                    # free is as far as at the corner.
+                    from_m = (1.0 - _AROUND) / max(near, 1e-6)
+                    to_m = (1.0 + _AROUND) / max(near, 1e-6)
+                    if far * (1.0 + 2.0 * _AROUND) > near:
+                        to_m = (1.0 + _AROUND) / far
                     for k in range(5):
                         vv = v + (half if k in (0, 1, 2) else (0 if k == 3 else step))
                         uu = u + (half if k in (0, 3, 4) else (0 if k == 1 else step))
@@ -349,9 +366,10 @@ def find_inverse_depth(
                             continue
                         marched[vv, uu] = step
                         x, y = rays[0, vv, uu], rays[1, vv, uu]
-                        inverse[vv, uu] = march(
+                        found = march(
                             up_m, highest_m, levels, leaf_m, place, far_m, north_m, east_m, height_m,
                             r[0, 0] * x + r[0, 1] * y + r[0, 2], r[1, 0] * x + r[1, 1] * y + r[1, 2],
-                            -(r[2, 0] * x + r[2, 1] * y + r[2, 2]),
+                            -(r[2, 0] * x + r[2, 1] * y + r[2, 2]), from_m, to_m,
                         )  # fmt: skip
+                        inverse[vv, uu] = far if found == _NOTHING else found
         step = half

@@ -63,8 +63,9 @@ def fences_of(strips: tuple[Strip, ...], terrain: HeightGrid) -> list[NDArray[np
             for up in (0.35, 0.75, 1.15)
         ]
         for first in range(0, len(feet), 12):
-            found.append(np.concatenate([posts[first : first + 12], *(wire[first : first + 12] for wire in wires)]))
-    return found
+            found.append(posts[first : first + 12])
+            found.append(np.concatenate([wire[first : first + 12] for wire in wires]))
+    return [rows for rows in found if len(rows)]
 
 
 def _walk(strip: Strip, side_m: float, step_m: float) -> NDArray[np.float64]:

@@ -10,12 +10,12 @@ from sitl.world.surface import bumps, crown_up_m, lattice
 
 CROWN_PALETTE = np.array(
     [
-        stored(66, 92, 36),  # broadleaf
-        stored(40, 62, 36),  # conifer
-        stored(84, 106, 46),  # poplar
-        stored(72, 94, 42),  # bush
+        stored(84, 110, 48),  # broadleaf
+        stored(52, 78, 46),  # conifer
+        stored(100, 122, 58),  # poplar
+        stored(88, 108, 52),  # bush
         stored(96, 84, 58),  # litter
-        stored(120, 104, 52),  # leaves that turn
+        stored(140, 120, 62),  # leaves that turn
     ],
     dtype=np.float64,
 )

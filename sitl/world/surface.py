@@ -136,12 +136,12 @@ def crown_up_m(dn: float, de: float, height_m: float, radius_m: float, kind: int
     r /= 0.78 + 0.37 * ragged
     if r >= 1.0:
         return 0.0
-    dome = math.sqrt(1.0 - r * r)
+    dome = math.sqrt(1.0 - r * r * r)
     clumps = bumps(dn * 0.9 + salt, de * 0.9) + 0.6 * bumps(dn * 2.1, de * 2.1 + salt) - 0.8
     if kind == 0:
-        return height_m * (0.42 + 0.58 * dome) + clumps * min(1.6, 0.5 * radius_m) * dome
+        return height_m * (0.2 + 0.8 * dome) + clumps * min(1.6, 0.5 * radius_m) * dome
     if kind == 2:
-        return height_m * (0.3 + 0.7 * dome) + 0.8 * clumps * dome
+        return height_m * (0.15 + 0.85 * dome) + 0.8 * clumps * dome
     return max(0.1, height_m * dome * (1.0 + 0.4 * clumps))
 
 
