@@ -18,9 +18,9 @@ _FARTHEST_M = 1200.0  # beyond, the world is a plane
 # are marched between them: the smallest for which a frame's rays suffice.
 _TOLERANCES = (0.02, 0.04, 0.08, 0.16, 0.32)
 _JUMP = 0.08
-_AROUND = 0.12  # of the depth: how far before and behind a thing's edge the thing may go on
+_AROUND = 0.06  # of the depth: how far before and behind a thing's edge the thing may go on
 _NOTHING = -1e30
-_MOST_FINE = 8000  # rays a frame may spend on each finer grid
+_MOST_FINE = 5000  # rays a frame may spend on each finer grid
 _NEAREST_M = 0.05
 _FINE = 0.006  # of the depth: smaller things than that are less than two pixels of most cameras
 
