@@ -39,6 +39,7 @@ bench-soak: $(VENV)/.installed-dev
 
 schema: $(VENV)/.installed
 	$(BIN)/python -c "from mission.plan_file import schema_text; print(schema_text(), end='')" > missions/mission.schema.json
+	$(BIN)/python -c "from sitl.world.file import schema_text; print(schema_text(), end='')" > sitl/worlds/world.schema.json
 
 safety-table: $(VENV)/.installed-dev
 	$(BIN)/python -m tests.faults.page

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from sitl.vehicle import Vector
 
-_EARTH_RADIUS_M = 6371000.0  # PX4's MapProjection
+EARTH_RADIUS_M = 6371000.0  # PX4's MapProjection
 
 
 @dataclass(frozen=True, slots=True)
@@ -18,9 +18,16 @@ class Origin:
 
     def global_of(self, position_m: Vector) -> Vector:
         """Latitude [rad], longitude [rad], altitude [m] of a position NED [m] (flat Earth: good within kilometres)."""
-        latitude_rad = self.latitude_rad + position_m[0] / _EARTH_RADIUS_M
-        longitude_rad = self.longitude_rad + position_m[1] / (_EARTH_RADIUS_M * math.cos(self.latitude_rad))
+        latitude_rad = self.latitude_rad + position_m[0] / EARTH_RADIUS_M
+        longitude_rad = self.longitude_rad + position_m[1] / (EARTH_RADIUS_M * math.cos(self.latitude_rad))
         return (latitude_rad, longitude_rad, self.altitude_m - position_m[2])
+
+    def place_ne_m(self, latitude_rad: float, longitude_rad: float) -> tuple[float, float]:
+        """Where a place on Earth lies, north and east [m]: global_of, the other way round."""
+        return (
+            (latitude_rad - self.latitude_rad) * EARTH_RADIUS_M,
+            (longitude_rad - self.longitude_rad) * EARTH_RADIUS_M * math.cos(self.latitude_rad),
+        )
 
 
 @dataclass(frozen=True, slots=True)

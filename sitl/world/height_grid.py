@@ -54,6 +54,15 @@ class HeightGrid:
         north = float(up[i + 1, j]) + column_part * (float(up[i + 1, j + 1]) - float(up[i + 1, j]))
         return south + row_part * (north - south)
 
+    def at_all(self, norths_m: NDArray[np.float64], easts_m: NDArray[np.float64]) -> NDArray[np.float64]:
+        """The heights at places (n,) [m] each, as (n,) float64 [m]."""
+        i, row_part = _fold_all((norths_m - self.south_m) / self.cell_m, self.up_m.shape[0])
+        j, column_part = _fold_all((easts_m - self.west_m) / self.cell_m, self.up_m.shape[1])
+        up = self.up_m.astype(np.float64)
+        south = up[i, j] + column_part * (up[i, j + 1] - up[i, j])
+        north = up[i + 1, j] + column_part * (up[i + 1, j + 1] - up[i + 1, j])
+        return np.asarray(south + row_part * (north - south))
+
 
 def _fold(place: float, n_nodes: int) -> tuple[int, float]:
     """Mirror a place in grid steps into the grid: its node below, and how far it is to the next one."""
@@ -62,3 +71,11 @@ def _fold(place: float, n_nodes: int) -> tuple[int, float]:
     folded = min(folded, 2.0 * last - folded)
     node = min(int(folded), last - 1)
     return node, folded - node
+
+
+def _fold_all(places: NDArray[np.float64], n_nodes: int) -> tuple[NDArray[np.int64], NDArray[np.float64]]:
+    last = n_nodes - 1
+    folded = np.fmod(np.abs(places), 2.0 * last)
+    folded = np.minimum(folded, 2.0 * last - folded)
+    nodes = np.minimum(folded.astype(np.int64), last - 1)
+    return nodes, folded - nodes

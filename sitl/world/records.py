@@ -20,7 +20,7 @@ SupportKind = Literal["lattice_tower", "wood_pole", "concrete_pole", "steel_pole
 StripKind = Literal["road", "track", "railway", "river", "fence", "hedge"]
 Roof = Literal["tile", "metal", "flat"]
 TreeKind = Literal["broadleaf", "conifer", "poplar", "bush"]
-GroundStyle = Literal["pasture"]
+GroundStyle = Literal["pasture", "meadow", "cropland", "forest_floor", "village"]
 
 
 @dataclass(frozen=True, slots=True)
