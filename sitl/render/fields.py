@@ -8,10 +8,18 @@ from numpy.typing import NDArray
 
 from sitl.render.colour import stored
 from sitl.render.noise import plane_noise
-from sitl.world.records import Ground
+from sitl.world.records import Ground, GroundStyle
 
 COARSE_M = 0.4
-_FIELD_M = 62.0
+# How wide a style's fields are [m], which parts of them bear a row crop and are ploughed, how moist they are on the
+# whole, and how readily bare ground shows.
+_STYLES: dict[GroundStyle, tuple[float, float, float, float, float]] = {
+    "pasture": (62.0, 0.14, 0.14, 0.0, 0.0),
+    "meadow": (90.0, 0.0, 0.0, 0.5, -0.5),
+    "cropland": (75.0, 0.5, 0.25, -0.3, 0.0),
+    "forest_floor": (150.0, 0.0, 0.0, 0.2, 1.1),
+    "village": (28.0, 0.08, 0.04, 0.3, 0.1),
+}
 _BEND_M = 1.6
 _LUSH = stored(74, 98, 44)
 _MEADOW = stored(104, 118, 60)
@@ -32,15 +40,16 @@ def lay_out(
     as cosine and sine over their spacing [1/m].
     """
     shape = tuple(max(8, round(side / COARSE_M)) for side in size_m)
-    n_fields = max(3, round(size_m[0] * size_m[1] / _FIELD_M**2))
+    field_m, crops, ploughed, moist, bare = _STYLES[ground.style]
+    n_fields = max(3, round(size_m[0] * size_m[1] / field_m**2))
     seeds = rng.uniform((0.0, 0.0), size_m, (n_fields, 2))
     bend = _BEND_M * np.stack([plane_noise(shape, 40.0, 3, rng), plane_noise(shape, 40.0, 3, rng)])
     owner, border_m = divide(seeds, bend, size_m[0] / shape[0], size_m[1] / shape[1])
     kinds = np.zeros((n_fields, 5), dtype=np.float32)
-    kinds[:, 0] = rng.normal(0.0, 1.0, n_fields)
-    use = rng.permutation(np.arange(n_fields)) % 7
-    kinds[:, 1] = use == 0
-    kinds[:, 2] = use == 3
+    kinds[:, 0] = rng.normal(moist, 1.0, n_fields)
+    use = (rng.permutation(n_fields) + 0.5) / n_fields
+    kinds[:, 1] = use < crops
+    kinds[:, 2] = use > 1.0 - ploughed
     turn = rng.uniform(0.0, math.pi, n_fields)
     spacing_m = rng.uniform(0.7, 1.5, n_fields)
     kinds[:, 3], kinds[:, 4] = np.cos(turn) / spacing_m, np.sin(turn) / spacing_m
@@ -48,7 +57,7 @@ def lay_out(
         [
             plane_noise(shape, 120.0, 5, rng) + 1.1 * kinds[owner, 0],
             plane_noise(shape, 32.0, 5, rng),
-            plane_noise(shape, 16.0, 4, rng),
+            plane_noise(shape, 16.0, 4, rng) + bare,
             border_m,
         ],
         axis=-1,

@@ -54,13 +54,12 @@ class Relief:
         leaf_m = np.array([e / n for e, n in zip(extent_m, leaves, strict=True)])
         level = highest_leaves(up_m, surface.cell_m, leaf_m, leaves[0], leaves[1])
         parts, rows, start = [], [], 0
-        for _ in range(n_levels):
+        for k in range(n_levels):
+            if k > 0:
+                level = level.reshape(level.shape[0] // 2, 2, level.shape[1] // 2, 2).max(axis=(1, 3))
             rows.append((start, *level.shape))
             parts.append(level.ravel())
             start += level.size
-            level = level.reshape(level.shape[0] // 2, 2, -1) if level.shape[0] > 1 else level[:, None]
-            level = level.max(axis=1)
-            level = level.reshape(len(level), -1, 2).max(axis=2) if level.shape[1] > 1 else level
         lowest, highest = float(up_m.min()), float(up_m.max())
         return cls(
             up_m,

@@ -49,17 +49,17 @@ class Renderer:
     ) -> None:
         self.intrinsics = intrinsics
         self._world = world
-        self._mount = CameraMount() if mount is None else mount
+        self.mount = CameraMount() if mount is None else mount
         self._optics = Optics() if optics is None else optics
         self._seed = seed
         self._linework = build_linework(world, wire_at_least_m)
         self._sun_ned = np.array(world.light.direction_ned)
         self._day = daylight_of(world.light)
         self._lens = lens_vector(intrinsics)
-        rays = ray_table(intrinsics)
+        self.rays = ray_table(intrinsics)
         relief, shares = _stage(surface_of(world), world.light)
-        self._ground = GroundView(ground_of(world), relief, shares, self._day, rays, intrinsics.fx_px)
-        x, y = rays
+        self._ground = GroundView(ground_of(world), relief, shares, self._day, self.rays, intrinsics.fx_px)
+        x, y = self.rays
         self._view = np.array([x.min(), x.max(), y.min(), y.max()], dtype=np.float64)
         shape = (intrinsics.height_px, intrinsics.width_px)
         self._light = np.empty((*shape, 3), dtype=np.float32)
@@ -76,20 +76,31 @@ class Renderer:
         A matt surface in a clear noon's full light shows its albedo. The array is the renderer's own: the next call
         writes into it.
         """
-        centre, ned_from_camera = camera_pose(pose, self._mount)
-        self._ground.draw(self._light, centre, ned_from_camera)
-        self._draw_lines(np.empty((0, 0), dtype=np.float32), centre, ned_from_camera)
+        self.ground_light(pose)
+        self.add_line(self._light, pose)
         return self._light
+
+    def ground_light(self, pose: Pose) -> NDArray[np.float32]:
+        """What light() gives, without the linework; the next call of either overwrites it."""
+        self._ground.draw(self._light, *camera_pose(pose, self.mount))
+        return self._light
+
+    def add_line(self, light: NDArray[np.float32], pose: Pose) -> None:
+        """Draw the linework as it is seen from a pose over `light`, hidden by the ground that was looked at last.
+
+        That may have been from near there.
+        """
+        self._draw_lines(light, np.empty((0, 0), dtype=np.float32), *camera_pose(pose, self.mount))
 
     def depth(self, pose: Pose) -> NDArray[np.float32]:
         """How far each pixel sees at a pose: (height, width) float32 [m] along the optical axis; inf in the sky.
 
         Ground, what stands on it, and of the linework what covers a twentieth of the pixel or more.
         """
-        centre, ned_from_camera = camera_pose(pose, self._mount)
+        centre, ned_from_camera = camera_pose(pose, self.mount)
         self._ground.look(centre, ned_from_camera)
         nearest = self._ground.inverse[: self.intrinsics.height_px, : self.intrinsics.width_px].copy()
-        self._draw_lines(nearest, centre, ned_from_camera)
+        self._draw_lines(self._light, nearest, centre, ned_from_camera)
         return np.where(nearest > 0.0, 1.0 / np.maximum(nearest, 1e-12), np.inf).astype(np.float32)
 
     def render(self, pose: Pose, seq: int) -> NDArray[np.uint8]:
@@ -112,12 +123,15 @@ class Renderer:
         return image
 
     def _draw_lines(
-        self, nearest: NDArray[np.float32], centre: NDArray[np.float64], ned_from_camera: NDArray[np.float64]
+        self,
+        light: NDArray[np.float32],
+        nearest: NDArray[np.float32],
+        centre: NDArray[np.float64],
+        ned_from_camera: NDArray[np.float64],
     ) -> None:
-        """Draw the linework over the ground that was looked at last."""
         lines = self._linework
         draw_linework(
-            self._light, self._ground.inverse, nearest, self._coverage, self._shaded, self._strips,
+            light, self._ground.inverse, nearest, self._coverage, self._shaded, self._strips,
             lines.members, lines.discs, lines.spans, lines.looks, self._sun_ned, centre,
             np.ascontiguousarray(ned_from_camera.T), self._lens, _REACH * self._view,
             self._ground.shine, self._day.air_bgr, float(self._day.table[6, 0]),
@@ -129,7 +143,7 @@ class Renderer:
         Returns for each conductor its visible part as (n, 4) float64 [px]: x1, y1, x2, y2 of straight pieces in the
         conductor's order, the centre of the first pixel at (0, 0); none of them where it is out of view.
         """
-        centre, ned_from_camera = camera_pose(pose, self._mount)
+        centre, ned_from_camera = camera_pose(pose, self.mount)
         pieces = []
         for conductor in self._world.conductors:
             points = (conductor.points_ned_m - centre) @ ned_from_camera
