@@ -16,11 +16,12 @@ LIGHT_PX = 4
 """How far apart the light is worked out, in pixels."""
 _HUE = 0.25  # how far the detail's hue turns grass from green to straw and back
 _DETAIL_LEVELS = 5.0  # beyond, a detail says less than the eye can see
+_SOIL_GRAIN = 0.6
 _LEAN = 0.7
 _GREY = (128.0, 128.0, 128.0, 128.0)
 
 
-@njit(nogil=True, cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@njit(nogil=True, cache=True, error_model="numpy", inline="always")  # type: ignore[untyped-decorator]
 def light_at(
     w: float,
     rx: float,
@@ -119,7 +120,7 @@ def light_ground(
     `is_edge` tells that depths jump, a pixel takes the light of the place whose `inverse` depth is most like its own.
     """
     unit, two, three, one, zero = np.float32(1 / 255), np.float32(2), np.float32(3), np.float32(1), np.float32(0)
-    middle = np.float32(127.5)
+    middle, dull = np.float32(127.5), np.float32(_SOIL_GRAIN)
     tinge, half, quarter = np.float32(_HUE), np.float32(0.5), np.float32(1.0 / LIGHT_PX)
     height_px, width_px = light.shape[0], light.shape[1]
     n = grid.shape[2]
@@ -155,7 +156,8 @@ def light_ground(
             for u in range(width_px):
                 four = detail[v, u]
                 cover = three * unit * np.float32((surface[v, u] >> fourth) & byte)
-                soil, grass = np.float32(four & byte), np.float32((four >> second) & byte)
+                soil = middle + dull * (np.float32(four & byte) - middle)
+                grass = np.float32((four >> second) & byte)
                 leaf, hue = np.float32((four >> third) & byte), np.float32((four >> fourth) & byte)
                 grassy = min(one, max(zero, cover - one))
                 grain = soil + grassy * (grass - soil)
@@ -217,7 +219,7 @@ class GroundView:
         find_inverse_depth(
             self.inverse, self._is_edge, self._marched, self._odd, self._rays,
             relief.up_m, relief.highest_m, relief.levels, relief.leaf_m, relief.place, relief.far_m, relief.is_flat,
-            centre, ned_from_camera,
+            centre, ned_from_camera, self._f_px,
         )  # fmt: skip
 
     def draw(

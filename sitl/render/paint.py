@@ -1,6 +1,7 @@
 """The picture of a world's ground, painted once and kept on disk."""
 
 import functools
+import itertools
 import math
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -98,21 +99,23 @@ def _paint(
     rng = np.random.default_rng(ground.seed)
     south_m, west_m, north_m, east_m = bounds_ne_m
     size_m = (north_m - south_m, east_m - west_m)
-    corner_m, texel_m = np.array([south_m, west_m]), np.array(size_m) / picture.shape[:2]
+    texel_m = np.array(size_m) / picture.shape[:2]
     coarse, owner, kinds = lay_out(ground, size_m, rng)
     fine = periodic_noise(_FINE, 64, 5, rng, persistence=0.8)
-    edges = np.linspace(0, picture.shape[0], _N_BANDS + 1).astype(int)
-    with ThreadPoolExecutor(2) as threads:
-        bands = [
-            threads.submit(paint_fields, picture, first, last, coarse, owner, kinds, fine, PALETTE, texel_m)
-            for first, last in zip(edges[:-1], edges[1:], strict=True)
-        ]
-        for band in bands:
-            band.result()
     houses = house_rows(buildings)
+    pieces = strip_rows(strips)
     standing = tree_rows(tuple(sorted(trees, key=lambda tree: tree.height_m)))
-    paint_houses(picture, houses, ROOF_PALETTE, corner_m, texel_m, True)
-    paint_litter(picture, standing, CROWN_PALETTE, corner_m, texel_m)
-    paint_strips(picture, strip_rows(strips), fine, STRIP_PALETTE, corner_m, texel_m)
-    paint_houses(picture, houses, ROOF_PALETTE, corner_m, texel_m, False)
-    paint_crowns(picture, standing, CROWN_PALETTE, corner_m, texel_m)
+
+    def paint_band(first: int, last: int) -> None:
+        band, corner_m = picture[first:last], np.array([south_m + first * texel_m[0], west_m])
+        paint_fields(picture, first, last, coarse, owner, kinds, fine, PALETTE, texel_m)
+        paint_houses(band, houses, ROOF_PALETTE, corner_m, texel_m, True)
+        paint_litter(band, standing, CROWN_PALETTE, corner_m, texel_m)
+        paint_strips(band, pieces, fine, STRIP_PALETTE, corner_m, texel_m)
+        paint_houses(band, houses, ROOF_PALETTE, corner_m, texel_m, False)
+        paint_crowns(band, standing, CROWN_PALETTE, corner_m, texel_m)
+
+    edges = np.linspace(0, picture.shape[0], _N_BANDS + 1).astype(int).tolist()
+    with ThreadPoolExecutor(2) as threads:
+        for done in [threads.submit(paint_band, *band) for band in itertools.pairwise(edges)]:
+            done.result()

@@ -22,7 +22,7 @@ _AROUND = 0.06  # of the depth: how far before and behind a thing's edge the thi
 _NOTHING = -1e30
 _MOST_FINE = 5000  # rays a frame may spend on each finer grid
 _NEAREST_M = 0.05
-_FINE = 0.006  # of the depth: smaller things than that are less than two pixels of most cameras
+_FINE_PX = 2.7  # smaller things may be rough
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -135,19 +135,22 @@ def march(
     du: float,
     from_m: float,
     to_m: float,
+    fine: float,
 ) -> float:
     """The inverse depth [1/m] at which a ray meets the surface; 0 or less where it meets the sky.
 
     The first arguments are Relief's. The ray starts at (`north_m`, `east_m`, `height_m`) and goes (`dn`, `de`, `du`)
     for each metre of depth. Where it meets nothing within a kilometre, it meets the plane at `far_m`. Only depths
-    between `from_m` and `to_m` [m] are looked at; _NOTHING where the ray meets nothing there.
+    between `from_m` and `to_m` [m] are looked at; _NOTHING where the ray meets nothing there. What is smaller than the
+    part `fine` of its depth may be taken for a box.
     """
     level_ground = -du / max(0.05, height_m - far_m)
     farthest = _FARTHEST_M / math.sqrt(dn * dn + de * de + du * du)
     z, end = max(_NEAREST_M, from_m), farthest
     if du < 0.0:
         z = max(z, (place[4] - height_m) / du)
-        end = min(end, (place[3] - 0.01 - height_m) / du)
+        farthest += z
+        end = min(farthest, (place[3] - 0.01 - height_m) / du)
     elif height_m > place[4] and du >= 0.0:
         return level_ground
     elif du > 0.0:
@@ -177,7 +180,7 @@ def march(
             z = out
             level = min(level + 1, top)
             continue
-        fine_m = _FINE * z
+        fine_m = fine * z
         if level > 0:
             if fine_m > leaf_m[0] * (1 << level):  # so far away, a part is a box
                 return 1.0 / max(z, (tallest - height_m) / du if du < 0.0 else z)
@@ -309,6 +312,7 @@ def find_inverse_depth(
     is_flat: bool,
     centre: NDArray[np.float64],
     ned_from_camera: NDArray[np.float64],
+    f_px: float,
 ) -> None:
     """Fill `inverse` (rows, columns) float32 with 1 / depth [1/m]; 0 or less is sky.
 
@@ -319,6 +323,7 @@ def find_inverse_depth(
     n_rows, n_columns = inverse.shape[0], inverse.shape[1]
     r = ned_from_camera
     north_m, east_m, height_m = centre[0], centre[1], -centre[2]
+    fine = _FINE_PX / f_px
     is_edge[:, :] = 0
     if is_flat:
         per_height = 1.0 / max(0.01, height_m - place[3])
@@ -333,7 +338,7 @@ def find_inverse_depth(
                 inverse[v, u] = march(
                     up_m, highest_m, levels, leaf_m, place, far_m, north_m, east_m, height_m,
                     r[0, 0] * x + r[0, 1] * y + r[0, 2], r[1, 0] * x + r[1, 1] * y + r[1, 2],
-                    -(r[2, 0] * x + r[2, 1] * y + r[2, 2]), 0.0, np.inf,
+                    -(r[2, 0] * x + r[2, 1] * y + r[2, 2]), 0.0, np.inf, fine,
                 )  # fmt: skip
     step = COARSE_PX
     is_uneven = not is_flat
@@ -368,7 +373,7 @@ def find_inverse_depth(
                         found = march(
                             up_m, highest_m, levels, leaf_m, place, far_m, north_m, east_m, height_m,
                             r[0, 0] * x + r[0, 1] * y + r[0, 2], r[1, 0] * x + r[1, 1] * y + r[1, 2],
-                            -(r[2, 0] * x + r[2, 1] * y + r[2, 2]), from_m, to_m,
+                            -(r[2, 0] * x + r[2, 1] * y + r[2, 2]), from_m, to_m, fine,
                         )  # fmt: skip
                         inverse[vv, uu] = far if found == _NOTHING else found
         step = half

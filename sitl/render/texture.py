@@ -138,7 +138,7 @@ def map_texture(
     r00, r01, r02 = rotation[0, 0], rotation[0, 1], rotation[0, 2]
     r10, r11, r12 = rotation[1, 0], rotation[1, 1], rotation[1, 2]
     r20, r21, r22 = rotation[2, 0], rotation[2, 1], rotation[2, 2]
-    zero, half, one, two = np.float32(0.0), np.float32(0.5), np.float32(1.0), np.float32(2.0)
+    zero, half, one = np.float32(0.0), np.float32(0.5), np.float32(1.0)
     outside, tiny = np.float32(_OUTSIDE), np.float32(1e-6)
     first_row, last_row = height_px, -1
     for v in range(height_px):
@@ -165,6 +165,8 @@ def map_texture(
             tall0, wide0, tall1, wide1 = levels[k0, 2], levels[k0, 3], levels[k1, 2], levels[k1, 3]
             per_n0, per_e0 = np.float32(tall0 / frame[2]), np.float32(wide0 / frame[3])
             per_n1, per_e1 = np.float32(tall1 / frame[2]), np.float32(wide1 / frame[3])
+            fold0, fold1 = np.float32(0.5) / wide0, np.float32(0.5) / wide1
+            fold2, fold3 = np.float32(0.5) / tall0, np.float32(0.5) / tall1
             for u in range(first, end):
                 rx, ry = rays[0, v, u], rays[1, v, u]
                 w = inverse[v, u]
@@ -175,12 +177,14 @@ def map_texture(
                 y = (north_m + up + depth * (r00 * rx + r01 * ry + r02)) * (per_n1 if is_coarse else per_n0)
                 wide = wide1 if is_coarse else wide0
                 tall = tall1 if is_coarse else tall0
+                fold_x = fold1 if is_coarse else fold0
+                fold_y = fold3 if is_coarse else fold2
                 if repeats:
-                    x -= np.floor(x / wide) * wide
-                    y -= np.floor(y / tall) * tall
+                    x -= np.floor(x * (fold_x + fold_x)) * wide
+                    y -= np.floor(y * (fold_y + fold_y)) * tall
                 else:
-                    x -= np.floor(x * half / wide) * two * wide
-                    y -= np.floor(y * half / tall) * two * tall
+                    x -= np.floor(x * fold_x) * (wide + wide)
+                    y -= np.floor(y * fold_y) * (tall + tall)
                     x = wide - abs(x - wide)
                     y = tall - abs(y - tall)
                 x += (column1 if is_coarse else column0) - half

@@ -1,4 +1,4 @@
-"""The painted ground tiles without a seam, keeps the line's way clear, and its kernels equal plain Python."""
+"""The ground is painted as its records say, kept on disk, and the painters' kernels equal plain Python."""
 
 import math
 
