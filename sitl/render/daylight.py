@@ -40,7 +40,7 @@ class Daylight:
 def daylight_of(light: Light) -> Daylight:
     """The colours that a light has: white at noon, warm near the horizon, blue in a clear dusk, grey when overcast."""
     height = math.sin(max(0.0, light.elevation_rad))
-    low = math.exp(-height / 0.16)  # the sun's way through the air reddens it
+    low = math.exp(-height / 0.3)  # the sun's way through the air reddens it
     sun = _even(np.array([1.0 - 0.62 * low, 1.0 - 0.12 * low, 1.0 + 0.5 * low]))
     grey = 1.0 if light.direct <= 0.0 else 0.0
     blue = (1.0 - grey) * (1.0 + 1.2 * low)
@@ -108,7 +108,7 @@ def sunlit(up_m: NDArray[np.float32], cell_m: float, ahead: float, side: float, 
             line = j + shift
             if 0 <= line < n_lines:
                 over_m = edge_m[line] - up_m[i, j]
-                seen[i, j] = min(1.0, max(0.0, 0.5 - over_m / (2.0 * sink_m + 0.05)))
+                seen[i, j] = min(1.0, max(0.0, 0.5 - over_m / (sink_m + 1e-3)))
                 edge_m[line] = max(edge_m[line], float(up_m[i, j])) - sink_m
     return seen
 

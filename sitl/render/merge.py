@@ -58,7 +58,7 @@ def arrange(
         elif kind == DECAL:
             key = -1e9 - z
         else:
-            nearest = 1e9
+            nearest, middle = 1e9, max(NEAR_M, z)
             for m in range(spans[k, 0], spans[k, 1]):
                 for end in range(0, 6, 3):
                     dn = members[m, end] - centre[0]
@@ -71,7 +71,8 @@ def arrange(
                     y = camera_from_ned[1, 0] * dn + camera_from_ned[1, 1] * de + camera_from_ned[1, 2] * dd
                     if reach[0] * z <= x <= reach[1] * z and reach[2] * z <= y <= reach[3] * z:
                         nearest = z
-            key = -(nearest - looks[k, 12])
+            # A member may cross the view with both its ends outside.
+            key = -((nearest if nearest < 1e9 else middle) - looks[k, 12])
         found[n], keys[n] = k, key
         n += 1
     return found[:n][np.argsort(keys[:n], kind="mergesort")]

@@ -1,19 +1,24 @@
 """The ground is painted as its records say, kept on disk, and the painters' kernels equal plain Python."""
 
-import math
+from typing import Any, get_args
 
 import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sitl.render.noise import periodic_noise
-from sitl.render.pasture import paint_fields, track_at
+from sitl.render.fields import divide, paint_fields
+from sitl.render.noise import periodic_noise, plane_noise
+from sitl.render.paint import ground_of, picture_size
 from sitl.render.projection import clip_to_view, project_point
-from sitl.render.vegetation import Plant, paint_plants
-from sitl.world.records import Light
+from sitl.render.roofs import ROOF_PALETTE, house_rows, paint_houses
+from sitl.render.strips import STRIP_PALETTE, paint_strips, strip_rows
+from sitl.render.texture import finest
+from sitl.render.vegetation import CROWN_PALETTE, paint_crowns, paint_litter
+from sitl.world.records import Building, Roof, Strip, StripKind, Tree, TreeKind
+from sitl.world.surface import tree_rows
+from tests.sitl.render.scenes import scene
 
-SUN = Light(math.radians(90.0), math.radians(45.0), direct=0.58, sky=0.42, visibility_m=1e4)
 VIEW = np.array([-0.7, 0.7, -0.5, 0.5])
 coordinates = st.lists(st.floats(-20.0, 20.0), min_size=3, max_size=3)
 
@@ -28,38 +33,102 @@ def test_noise_tiles_and_has_unit_spread() -> None:
         periodic_noise(100, 8, 2, np.random.default_rng(1))
 
 
+def test_plane_noise_has_unit_spread_and_no_period() -> None:
+    noise = plane_noise((60, 90), 12.0, 3, np.random.default_rng(1))
+    assert noise.shape == (60, 90)
+    assert (noise.mean(), noise.std()) == pytest.approx((0.0, 1.0), abs=1e-4)
+    assert np.abs(noise[:, 0] - noise[:, -1]).mean() > 3.0 * np.abs(np.diff(noise, axis=1)).mean()
+
+
 def test_compiled_painting_equals_plain_python() -> None:
     rng = np.random.default_rng(2)
-    coarse, fine = rng.normal(size=(8, 8, 5)).astype(np.float32), rng.normal(size=(4, 4)).astype(np.float32)
-    coarse[..., 3:] = np.abs(coarse[..., 3:]) * 2
-    compiled, plain = np.zeros((2, 32, 32, 4), dtype=np.uint8)
-    palette = rng.uniform(0.2, 0.8, (6, 3))
-    paint_fields(compiled, coarse, fine, palette, 1.5)
-    paint_fields.py_func(plain, coarse, fine, palette, 1.5)
-    assert compiled[..., 3].max() <= 128
+    coarse, fine = rng.normal(size=(8, 9, 4)).astype(np.float32), rng.normal(size=(4, 4)).astype(np.float32)
+    coarse[..., 3] = np.abs(coarse[..., 3]) * 2
+    owner = rng.integers(0, 3, (8, 9)).astype(np.int32)
+    kinds = np.array([[0, 1, 0, 1.1, 0.4], [0, 0, 1, 0.9, 0.2], [0, 0, 0, 1, 1]], dtype=np.float32)
+    compiled, plain = np.zeros((2, 32, 36, 4), dtype=np.uint8)
+    palette = rng.uniform(0.2, 0.8, (5, 3))
+    for paint, picture in ((paint_fields, compiled), (paint_fields.py_func, plain)):
+        paint(picture, 4, 32, coarse, owner, kinds, fine, palette, np.array([1.5, 1.4]))
+    assert not compiled[:4].any()
     assert np.abs(compiled.astype(int) - plain).max() <= 1
     assert compiled.std() > 5.0
+    seeds, bend = rng.uniform(0, 20, (4, 2)), rng.normal(size=(2, 8, 9)).astype(np.float32)
+    for got, expected in zip(divide(seeds, bend, 2.0, 2.2), divide.py_func(seeds, bend, 2.0, 2.2), strict=True):
+        np.testing.assert_allclose(got, expected, rtol=1e-5)
 
 
-@given(north_m=st.floats(-500, 500))
-@settings(deadline=None)
-def test_the_track_repeats(north_m: float) -> None:
-    here, there = track_at(north_m, 200.0), track_at(north_m + 200.0, 200.0)
-    assert here == pytest.approx(there, abs=1e-6)
-    assert track_at.py_func(north_m, 200.0) == pytest.approx(here)
+POINTS = ((-6.0, -8.0), (0.0, 0.0), (6.0, 2.0))
+STRIPS = tuple(
+    Strip(kind, tuple((n, e + 0.3 * k) for n, e in POINTS), 2.0) for k, kind in enumerate(get_args(StripKind))
+)
+HOUSES = tuple(
+    Building((4.0 * k - 4.0, 3.0), 0.4 + k, 3.0, 2.0, 2.5, 3.0, roof) for k, roof in enumerate(get_args(Roof))
+)
+TREES = tuple(Tree(kind, 3.0 * k - 4.0, -3.0, 3.0, 1.2) for k, kind in enumerate(get_args(TreeKind)))
+CORNER, TEXEL = np.array([-8.0, -8.0]), np.array([0.25, 0.25])
+FINE = np.random.default_rng(3).normal(size=(8, 8)).astype(np.float32)
 
 
-def test_a_tree_hides_the_ground_and_shades_it_away_from_the_sun() -> None:
-    """At the picture's corner, so that it wraps over both edges; the sun in the east throws the shadow west."""
-    picture = np.full((256, 256, 4), 160, dtype=np.uint8)
-    paint_plants(picture, [Plant(0.0, 0.0, 2.0)], 0.05, SUN, np.random.default_rng(3))
-    assert picture[0, 0, 3] > 200  # leaves
-    assert picture[-10, -10, 3] > 200
-    west, east = picture[0, -60, :3].astype(int), picture[0, 60, :3].astype(int)
-    assert np.all(east == 160)
-    assert np.all(west < 130)
-    assert picture[0, -60, 3] == 160  # the shadow is on the grass
-    assert np.all(picture[128, 128] == 160)
+@pytest.mark.parametrize(
+    ("paint", "arguments"),
+    [
+        (paint_strips, (strip_rows(STRIPS), FINE, STRIP_PALETTE, CORNER, TEXEL)),
+        (paint_houses, (house_rows(HOUSES), ROOF_PALETTE, CORNER, TEXEL, True)),
+        (paint_houses, (house_rows(HOUSES), ROOF_PALETTE, CORNER, TEXEL, False)),
+        (paint_litter, (tree_rows(TREES), CROWN_PALETTE, CORNER, TEXEL)),
+        (paint_crowns, (tree_rows(TREES), CROWN_PALETTE, CORNER, TEXEL)),
+    ],
+    ids=["strips", "yards", "houses", "litter", "crowns"],
+)
+def test_compiled_painters_equal_plain_python(paint: Any, arguments: tuple[Any, ...]) -> None:
+    compiled, plain = np.full((2, 64, 64, 4), 170, dtype=np.uint8)
+    paint(compiled, *arguments)
+    paint.py_func(plain, *arguments)
+    assert np.mean(compiled != 170) > 0.03
+    assert np.abs(compiled.astype(int) - plain).max() <= 1
+
+
+def test_bands_make_the_same_picture() -> None:
+    """A band that starts elsewhere paints its part of the whole, but for the finest grain."""
+    whole, band = np.full((64, 64, 4), 170, dtype=np.uint8), np.full((32, 64, 4), 170, dtype=np.uint8)
+    rest = (house_rows(HOUSES), ROOF_PALETTE)
+    paint_houses(whole, *rest, CORNER, TEXEL, False)
+    paint_houses(band, *rest, CORNER + [8.0, 0.0], TEXEL, False)
+    np.testing.assert_array_equal(whole[32:], band)
+
+
+def test_what_stands_somewhere_is_painted_there() -> None:
+    ground = ground_of(
+        scene(
+            trees=(Tree("broadleaf", 20.0, 20.0, 9.0, 4.0),),
+            buildings=(Building((-20.0, 20.0), 0.0, 12.0, 8.0, 4.0, 5.5, "metal"),),
+            strips=(Strip("road", ((-40.0, -20.0), (40.0, -20.0)), 6.0), Strip("river", ((-40.0, 0.0), (40.0, 0.0)), 5.0)),
+        )
+    ).surface
+    picture = finest(ground.atlas, ground.levels)
+    assert picture.shape == (1920, 1920, 4)
+
+    def at(north_m: float, east_m: float) -> np.ndarray:
+        i, j = round((north_m + 48.0) * 20), round((east_m + 48.0) * 20)
+        return picture[i - 4 : i + 5, j - 4 : j + 5].reshape(-1, 4).mean(axis=0)
+
+    assert at(20.0, 20.0)[3] == 255  # leaves
+    blue, green, red, cover = at(-20.0, 21.5)
+    assert min(blue, green, red) > 120  # sheet metal
+    assert cover < 30
+    blue, green, red, _ = at(10.0, -20.0)
+    assert abs(red - blue) < 15  # asphalt
+    assert at(0.0, 0.0)[3] < 12  # water
+    assert at(40.0, 40.0)[3] > 80
+
+
+def test_a_large_ground_gets_coarser_texels() -> None:
+    assert picture_size((96.0, 96.0)) == (1920, 1920)
+    rows, columns = picture_size((500.0, 1300.0))
+    assert rows * columns <= 50_000_000
+    assert rows % 128 == columns % 128 == 0
+    assert max(picture_size((20.0, 3000.0))) <= 20_000
 
 
 @given(start=coordinates, end=coordinates)
