@@ -260,9 +260,7 @@ class GroundView:
             rows = slice(first, last + 1)
             # Of grain, the nearest texel is as good as a mean of four.
             how = cv2.INTER_NEAREST if texture.repeats else cv2.INTER_LINEAR
-            cv2.remap(
-                texture.atlas, self._columns[rows], self._rows[rows], how, out[rows], cv2.BORDER_CONSTANT, beyond
-            )
+            cv2.remap(texture.atlas, self._columns[rows], self._rows[rows], how, out[rows], cv2.BORDER_CONSTANT, beyond)
         return int(first), int(last)
 
 

@@ -191,9 +191,7 @@ def _thinned(rows: NDArray[np.float64]) -> NDArray[np.float64]:
     return firsts
 
 
-def cast_shadow(
-    members: NDArray[np.float64], sun_ned: NDArray[np.float64], terrain: HeightGrid
-) -> NDArray[np.float64]:
+def cast_shadow(members: NDArray[np.float64], sun_ned: NDArray[np.float64], terrain: HeightGrid) -> NDArray[np.float64]:
     """The shadows (n, 9) that members (n, 9) cast on the terrain, as ribbons whose brightness is their depth.
 
     The sun is no point: a shadow's edge softens with the distance it falls, and what is thinner than that half-shadow

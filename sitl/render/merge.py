@@ -114,9 +114,7 @@ def draw_linework(
             coverage, shaded, strips, members[spans[k, 0] : spans[k, 1]], kind != ROUND, material, sun_ned, centre,
             camera_from_ned, lens, reach,
         )  # fmt: skip
-        n += draw_discs(
-            coverage, shaded, strips[n:], discs[spans[k, 2] : spans[k, 3]], centre, camera_from_ned, lens
-        )
+        n += draw_discs(coverage, shaded, strips[n:], discs[spans[k, 2] : spans[k, 3]], centre, camera_from_ned, lens)
         merge_strips(
             light, inverse, nearest, coverage, shaded, strips[:n], bgr, kind, looks[k, 11], shine, air_bgr, extinction
         )

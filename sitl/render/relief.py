@@ -10,17 +10,18 @@ from numpy.typing import NDArray
 
 from sitl.world.height_grid import HeightGrid
 
-COARSE_PX = 8
+COARSE_PX = 16
 _LEAF_M = 1.0
 _MOST_LEVELS = 7
 _FARTHEST_M = 1200.0  # beyond, the world is a plane
 # What part of the inverse depth two neighbours may disagree by, beyond what a smooth surface explains, before rays
 # are marched between them: the smallest for which a frame's rays suffice.
-_TOLERANCES = (0.02, 0.04, 0.08, 0.16, 0.32)
+_TOLERANCES = (0.02, 0.04, 0.08, 0.16, 0.32, 0.64, 0.9)
 _JUMP = 0.08
 _AROUND = 0.06  # of the depth: how far before and behind a thing's edge the thing may go on
 _NOTHING = -1e30
-_MOST_FINE = 5000  # rays a frame may spend on each finer grid
+_BUSY_M, _BUSY_FROM_M = 0.3, 250.0
+_MOST_FINE = 4000  # rays a frame may spend on each finer grid
 _NEAREST_M = 0.05
 _FINE_PX = 2.7  # smaller things may be rough
 
@@ -269,10 +270,66 @@ def _mark_odd(
             odd[i, j] = here
             if step == 4:
                 is_edge[i, j] = here >= _JUMP
+    if step == COARSE_PX:
+        return _TOLERANCES[0]
     for k in range(len(_TOLERANCES)):
         if 5 * counts[k] <= _MOST_FINE:
             return _TOLERANCES[k] if counts[k] > 0 else np.inf
     return np.inf
+
+
+@njit(nogil=True, cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+def _mark_busy(
+    inverse: NDArray[np.float32],
+    odd: NDArray[np.float32],
+    rays: NDArray[np.float32],
+    highest_m: NDArray[np.float32],
+    levels: NDArray[np.int64],
+    leaf_m: NDArray[np.float64],
+    place: NDArray[np.float64],
+    centre: NDArray[np.float64],
+    r: NDArray[np.float64],
+) -> None:
+    """Mark the coarse squares between whose rays something may stand that none of them met.
+
+    That is where the surface round the rays' last tenth is higher than where they end.
+    """
+    top = levels.shape[0] - 1
+    for i in range((inverse.shape[0] - 1) // COARSE_PX):
+        for j in range((inverse.shape[1] - 1) // COARSE_PX):
+            if odd[i, j] >= 1.0:
+                continue
+            low_a = low_b = 1e9
+            high_a = high_b = -1e9
+            up_m, n_sky = -1e9, 0
+            for k in range(4):
+                v, u = (i + (k >> 1)) * COARSE_PX, (j + (k & 1)) * COARSE_PX
+                w = inverse[v, u]
+                if w <= 1.0 / _BUSY_FROM_M:
+                    n_sky += 1 if w <= 0.0 else 5
+                    continue
+                x, y = rays[0, v, u], rays[1, v, u]
+                a = (r[0, 0] * x + r[0, 1] * y + r[0, 2]) / w / leaf_m[0]
+                b = (r[1, 0] * x + r[1, 1] * y + r[1, 2]) / w / leaf_m[1]
+                up_m = max(up_m, -centre[2] - (r[2, 0] * x + r[2, 1] * y + r[2, 2]) / w)
+                low_a, high_a = min(low_a, a, 0.9 * a), max(high_a, a, 0.9 * a)
+                low_b, high_b = min(low_b, b, 0.9 * b), max(high_b, b, 0.9 * b)
+            if n_sky == 4:
+                continue
+            if n_sky > 0:
+                odd[i, j] = 1.0
+                continue
+            a0, b0 = (centre[0] - place[0]) / leaf_m[0], (centre[1] - place[1]) / leaf_m[1]
+            level, reach = 0, max(high_a - low_a, high_b - low_b)
+            while level < top and reach > 2.0:
+                reach *= 0.5
+                level += 1
+            n_rows, n_columns = levels[level, 1], levels[level, 2]
+            for y_part in range(int(math.floor(a0 + low_a)) >> level, (int(math.floor(a0 + high_a)) >> level) + 1):
+                for x_part in range(int(math.floor(b0 + low_b)) >> level, (int(math.floor(b0 + high_b)) >> level) + 1):
+                    part = _fold(y_part, n_rows) * n_columns + _fold(x_part, n_columns)
+                    if highest_m[levels[level, 0] + part] > up_m + _BUSY_M:
+                        odd[i, j] = 1.0
 
 
 @njit(nogil=True, cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
@@ -347,6 +404,8 @@ def find_inverse_depth(
         threshold = np.inf
         if is_uneven:
             threshold = _mark_odd(inverse, marched, odd, is_edge, step)
+            if step == COARSE_PX:
+                _mark_busy(inverse, odd, rays, highest_m, levels, leaf_m, place, centre, r)
         _halve(inverse, odd, step, not is_uneven)
         is_uneven = threshold < np.inf
         if is_uneven:
@@ -363,6 +422,8 @@ def find_inverse_depth(
                     to_m = (1.0 + _AROUND) / max(near, 1e-6)
                     if far * (1.0 + 2.0 * _AROUND) > near:
                         to_m = (1.0 + _AROUND) / far
+                    if step == COARSE_PX:
+                        from_m, to_m = 0.0, np.inf
                     for k in range(5):
                         vv = v + (half if k in (0, 1, 2) else (0 if k == 3 else step))
                         uu = u + (half if k in (0, 3, 4) else (0 if k == 1 else step))

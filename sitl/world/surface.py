@@ -3,7 +3,6 @@
 import functools
 import math
 
-import cv2
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
@@ -172,7 +171,9 @@ def raise_crowns(
 
 
 @njit(nogil=True, cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
-def raise_roof(up_m: NDArray[np.float32], place: NDArray[np.float64], house: NDArray[np.float64], foot_m: float) -> None:
+def raise_roof(
+    up_m: NDArray[np.float32], place: NDArray[np.float64], house: NDArray[np.float64], foot_m: float
+) -> None:
     """Raise the surface to a roof over walls; `house` is building_row's, `foot_m` the ground at its centre."""
     rows, columns = up_m.shape
     north_m, east_m, c, s, half_length, half_width = house[0], house[1], house[2], house[3], house[4], house[5]

@@ -20,7 +20,9 @@ HOUSE = Building((0.0, 0.0), 0.0, 12.0, 8.0, 4.0, 4.0, "flat")
 
 
 @pytest.mark.parametrize("elevation_deg", [25.0, 45.0])
-@pytest.mark.parametrize(("azimuth_deg", "towards"), [(90.0, (0, -1)), (270.0, (0, 1)), (0.0, (-1, 0)), (180.0, (1, 0))])
+@pytest.mark.parametrize(
+    ("azimuth_deg", "towards"), [(90.0, (0, -1)), (270.0, (0, 1)), (0.0, (-1, 0)), (180.0, (1, 0))]
+)
 def test_a_house_throws_its_shadow_away_from_the_sun(
     elevation_deg: float, azimuth_deg: float, towards: tuple[int, int]
 ) -> None:
@@ -46,9 +48,7 @@ def test_a_house_throws_its_shadow_away_from_the_sun(
 
 def test_the_shadow_is_seen_in_the_picture() -> None:
     pose = looking_down(0.0, 0.0, 25.0)
-    with_house, without = (
-        Renderer(scene(buildings=houses), CAMERA).light(pose).copy() for houses in ((HOUSE,), ())
-    )
+    with_house, without = (Renderer(scene(buildings=houses), CAMERA).light(pose).copy() for houses in ((HOUSE,), ()))
     west = round(CAMERA.cx_px - CAMERA.fx_px * 6.0 / 25.0)
     shade = with_house[110:130, west - 3 : west + 3].mean() / without[110:130, west - 3 : west + 3].mean()
     assert 0.15 < shade < 0.75
@@ -124,9 +124,7 @@ def test_compiled_light_equals_plain_python() -> None:
     results = []
     for on_grid, on_ground in ((light_grid, light_ground), (light_grid.py_func, light_ground.py_func)):
         grid, light = np.empty((6, 5, 7), np.float32), np.empty((16, 24, 3), np.float32)
-        on_grid(
-            grid, inverse, rays, centre, ned_from_camera, shares[0], np.array([0.0, 0.0, 0.5]), table
-        )
+        on_grid(grid, inverse, rays, centre, ned_from_camera, shares[0], np.array([0.0, 0.0, 0.5]), table)
         on_ground(light, surface, detail, (3, 12), grid, is_edge, inverse)
         results.append((grid, light))
     np.testing.assert_allclose(results[0][0], results[1][0], rtol=1e-4, atol=1e-6)

@@ -71,7 +71,9 @@ def test_what_is_far_comes_first_and_what_is_behind_not_at_all() -> None:
 def test_a_near_pole_hides_a_far_one() -> None:
     """One wooden, one of concrete, in a row: from either side the nearer one's colour is seen."""
     supports = tuple(
-        Support(kind, (n, 0.0, 0.0), (n, 0.0, -12.0), 0.0, (Member((n, 0.0, 0.0), (n, 0.0, -12.0), 0.6, 0.6, material),))
+        Support(
+            kind, (n, 0.0, 0.0), (n, 0.0, -12.0), 0.0, (Member((n, 0.0, 0.0), (n, 0.0, -12.0), 0.6, 0.6, material),)
+        )
         for n, kind, material in ((10.0, "wood_pole", "wood"), (14.0, "concrete_pole", "concrete"))
     )
     world = scene()

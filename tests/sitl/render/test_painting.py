@@ -103,7 +103,10 @@ def test_what_stands_somewhere_is_painted_there() -> None:
         scene(
             trees=(Tree("broadleaf", 20.0, 20.0, 9.0, 4.0),),
             buildings=(Building((-20.0, 20.0), 0.0, 12.0, 8.0, 4.0, 5.5, "metal"),),
-            strips=(Strip("road", ((-40.0, -20.0), (40.0, -20.0)), 6.0), Strip("river", ((-40.0, 0.0), (40.0, 0.0)), 5.0)),
+            strips=(
+                Strip("road", ((-40.0, -20.0), (40.0, -20.0)), 6.0),
+                Strip("river", ((-40.0, 0.0), (40.0, 0.0)), 5.0),
+            ),
         )
     ).surface
     picture = finest(ground.atlas, ground.levels)

@@ -118,9 +118,7 @@ def test_points_are_projected_as_opencv_does(lens: str) -> None:
     nothing = np.zeros(3)
     if lens == "fisheye":
         camera = Intrinsics(640, 480, 410.0, 405.0, 318.0, 243.0, (-0.03, 0.006, -0.004, 0.001), "fisheye")
-        expected, _ = cv2.fisheye.projectPoints(
-            points[:, None], nothing, nothing, matrix, np.array(camera.distortion)
-        )
+        expected, _ = cv2.fisheye.projectPoints(points[:, None], nothing, nothing, matrix, np.array(camera.distortion))
     else:
         camera = Intrinsics(640, 480, 410.0, 405.0, 318.0, 243.0, (-0.2, 0.05, 0.001, -0.002, 0.01))
         expected, _ = cv2.projectPoints(points, nothing, nothing, matrix, np.array(camera.distortion))

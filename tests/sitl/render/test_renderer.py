@@ -16,8 +16,8 @@ from sitl.pose import Pose
 from sitl.render.lens import CameraMount, camera_pose, lens_vector, pinhole, ray_table
 from sitl.render.linework import build_linework, cast_shadow
 from sitl.render.map import render_map
-from sitl.render.projection import project_point
 from sitl.render.merge import DECAL, ROUND, SHADOW
+from sitl.render.projection import project_point
 from sitl.render.renderer import Renderer
 from sitl.render.sensor import Optics, develop, fall_off, noise_table, tone_curve
 from sitl.world.file import load_world
@@ -241,7 +241,9 @@ def test_a_road_has_lines_and_a_railway_rails() -> None:
     points = ((-40.0, -40.0), (0.0, 0.0), (40.0, 0.0))
     strips = (Strip("road", points, 6.0), Strip("railway", points, 4.0), Strip("fence", points, 0.1))
     lines = build_linework(dataclasses.replace(NO_WIRE, strips=strips))
-    decals = np.concatenate([lines.members[a:b] for (a, b, *_), k in zip(lines.spans, lines.looks[:, 6], strict=True) if k == DECAL])
+    decals = np.concatenate(
+        [lines.members[a:b] for (a, b, *_), k in zip(lines.spans, lines.looks[:, 6], strict=True) if k == DECAL]
+    )
     away_m = np.abs(decals[decals[:, 0] > 5.0][:, 1])
     assert set(np.round(away_m, 2)) == {0.0, 2.78}
     rails = lines.members[(lines.members[:, 6] == 0.075) & (lines.members[:, 8] == 1.0)]
