@@ -110,7 +110,7 @@ def paint_fields(
     palette: NDArray[np.float64],
     texel_m: NDArray[np.float64],
 ) -> None:
-    """Paint grass, soil and crop rows into the rows `first_row` to `last_row` - 1 of `picture` (rows, columns, 4) uint8.
+    """Paint grass, soil and crop rows into `picture` (rows, columns, 4) uint8, from `first_row` to before `last_row`.
 
     `coarse`, `owner` and `kinds` are lay_out's and cover the whole picture. `fine` (m, m) float32 repeats texel by
     texel; m is a power of two. `palette` is PALETTE, `texel_m` (north, east).

@@ -116,8 +116,9 @@ def light_ground(
     """Bring surface and detail, and the light on them, into `light` (height, width, 3) float32 linear BGR.
 
     `surface` and `detail` are (height, width) int32, the four channels of a pixel in one number, the first lowest: so
-    the loops become vector instructions. `detail` counts in `detail_rows` (first, last) only. `grid` is light_grid's, mixed between its places; but where
-    `is_edge` tells that depths jump, a pixel takes the light of the place whose `inverse` depth is most like its own.
+    the loops become vector instructions. `detail` counts in `detail_rows` (first, last) only. `grid` is
+    light_grid's, mixed between its places; but where `is_edge` tells that depths jump, a pixel takes the light of the
+    place whose `inverse` depth is most like its own.
     """
     unit, two, three, one, zero = np.float32(1 / 255), np.float32(2), np.float32(3), np.float32(1), np.float32(0)
     middle, dull = np.float32(127.5), np.float32(_SOIL_GRAIN)
@@ -256,6 +257,7 @@ class GroundView:
             self._columns, self._rows, self.inverse, self._rays, self._thresholds, centre, ned_from_camera,
             self._f_px, texture.levels, frame, lean,
         )  # fmt: skip
+        out[:first] = out[last + 1 :] = beyond
         if first <= last:
             rows = slice(first, last + 1)
             # Of grain, the nearest texel is as good as a mean of four.

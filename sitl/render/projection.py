@@ -109,7 +109,8 @@ def draw_members(
     """Draw straight members into a layer and return how many strips they became.
 
     `coverage`, `shaded`: see add_strip. `strips` (m, 8) is written: each strip as add_strip takes it, and the inverse
-    depth [1/m] at its start and end; what would be more than m strips is not drawn. `members` is (n, 9): both ends NED [m], both diameters [m], and a
+    depth [1/m] at its start and end; what would be more than m strips is not drawn.
+    `members` is (n, 9): both ends NED [m], both diameters [m], and a
     brightness. Round ones are lit as cylinders by `material` = (ambient, direct, gloss) and a sun towards `sun_ned`
     (3,); ribbons lie flat on a horizontal plane and show their brightness alone. `centre` (3,) NED [m] and
     `camera_from_ned` (3, 3) are the camera's, `reach` is clip_to_view's.

@@ -172,7 +172,7 @@ def march(
         level += 1
     nudge = 1e-4 / max(1e-3, abs(da) + abs(db))
     while z < end:
-        i, j = int(math.floor(a0 + z * da)) >> level, int(math.floor(b0 + z * db)) >> level
+        i, j = math.floor(a0 + z * da) >> level, math.floor(b0 + z * db) >> level
         z_a, z_b = (((i + ahead_a) << level) - a0) * per_a, (((j + ahead_b) << level) - b0) * per_b
         out = min(end, max(min(z_a, z_b), z) + nudge)
         n_rows, n_columns = levels[level, 1], levels[level, 2]
@@ -325,8 +325,8 @@ def _mark_busy(
                 reach *= 0.5
                 level += 1
             n_rows, n_columns = levels[level, 1], levels[level, 2]
-            for y_part in range(int(math.floor(a0 + low_a)) >> level, (int(math.floor(a0 + high_a)) >> level) + 1):
-                for x_part in range(int(math.floor(b0 + low_b)) >> level, (int(math.floor(b0 + high_b)) >> level) + 1):
+            for y_part in range(math.floor(a0 + low_a) >> level, (math.floor(a0 + high_a) >> level) + 1):
+                for x_part in range(math.floor(b0 + low_b) >> level, (math.floor(b0 + high_b) >> level) + 1):
                     part = _fold(y_part, n_rows) * n_columns + _fold(x_part, n_columns)
                     if highest_m[levels[level, 0] + part] > up_m + _BUSY_M:
                         odd[i, j] = 1.0

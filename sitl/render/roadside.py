@@ -28,8 +28,8 @@ def decals_of(strips: tuple[Strip, ...], terrain: HeightGrid) -> list[Decal]:
             continue
         half_m = strip.width_m / 2.0
         if half_m > 2.0:
-            for side_m in (-(half_m - 0.22), half_m - 0.22):
-                found.append((_bars(_walk(strip, side_m, _STEP_M), terrain, 0.12, 0.0), _WHITE))
+            sides_m = (-(half_m - 0.22), half_m - 0.22)
+            found += [(_bars(_walk(strip, side_m, _STEP_M), terrain, 0.12, 0.0), _WHITE) for side_m in sides_m]
         if half_m > 2.4:
             middle = _walk(strip, 0.0, _DASH_M)
             dashes = middle[:-1:3], middle[1::3]

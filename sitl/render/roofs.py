@@ -109,7 +109,7 @@ def _paint_roof(
             _lay(texel, 1.0, palette, which, 1.08 + 0.05 * weather, 12.0)
     elif kind == 1:
         seam = abs(along / 0.55 - math.floor(along / 0.55) - 0.5) * 0.55
-        shade = 0.93 + 0.1 * (weather - 0.75) + 0.03 * lattice(int(math.floor(along / 0.55)), int(1000 * salt))
+        shade = 0.93 + 0.1 * (weather - 0.75) + 0.03 * lattice(math.floor(along / 0.55), int(1000 * salt))
         shade *= 1.0 - 0.2 * rise(0.24, 0.27, seam)
         _lay(texel, 1.0, palette, 1, shade, 0.0)
         if abs(abs(across) % 2.6 - 1.3) < 0.03:

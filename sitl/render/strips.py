@@ -151,7 +151,7 @@ def _paint_place(
         _blend(texel, worn, palette, 1, 1.0 + 0.08 * grain, 140.0)
         _blend(texel, rut, palette, 2, 0.97 + 0.05 * grain2, 85.0)
     elif kind == 2:
-        stone = lattice(int(math.floor(north_m * 17.0)), int(math.floor(east_m * 17.0)))
+        stone = lattice(math.floor(north_m * 17.0), math.floor(east_m * 17.0))
         bed = rise(half + 0.2, half - 0.25, away + 0.15 * grain)
         _blend(texel, rise(half + 1.2, half, away + 0.3 * grain), palette, 7, 0.95 + 0.1 * grain, 170.0)
         _blend(texel, bed, palette, 3, 0.78 + 0.3 * stone + 0.05 * grain - 0.08 * rise(1.0, 0.4, away), 85.0)

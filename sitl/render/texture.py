@@ -56,12 +56,13 @@ def layout(n_rows: int, n_columns: int) -> tuple[tuple[int, int], NDArray[np.flo
 def fill_levels(atlas: NDArray[np.uint8], levels: NDArray[np.float32], repeats: bool) -> None:
     """Make all coarser levels, and all borders, from the finest level that is already in the atlas."""
     kind = cv2.BORDER_WRAP if repeats else cv2.BORDER_REPLICATE
-    picture = None
+    picture: NDArray[np.uint8] | None = None
     for row, column, n_rows, n_columns in levels.astype(int):
         if picture is None:
             picture = atlas[row : row + n_rows, column : column + n_columns]
         else:
-            picture = cv2.resize(picture, (n_columns, n_rows), interpolation=cv2.INTER_AREA)
+            small = cv2.resize(picture, (n_columns, n_rows), interpolation=cv2.INTER_AREA)
+            picture = np.asarray(small, dtype=np.uint8)
         # Only the rim is made wider, not a copy of the whole: the finest level is large.
         b = _BORDER
         atlas[row : row + n_rows, column : column + n_columns] = picture

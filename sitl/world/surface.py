@@ -109,10 +109,9 @@ def bumps(x: float, y: float) -> float:
     i, j = math.floor(x), math.floor(y)
     u, v = x - i, y - j
     u, v = u * u * (3.0 - 2.0 * u), v * v * (3.0 - 2.0 * v)
-    i, j = int(i), int(j)
     low = lattice(i, j) * (1.0 - v) + lattice(i, j + 1) * v
     high = lattice(i + 1, j) * (1.0 - v) + lattice(i + 1, j + 1) * v
-    return low * (1.0 - u) + high * u
+    return float(low * (1.0 - u) + high * u)
 
 
 @njit(nogil=True, cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
@@ -130,7 +129,7 @@ def crown_up_m(dn: float, de: float, height_m: float, radius_m: float, kind: int
         r /= 0.8 + 0.35 * boughs
         if r >= 1.0:
             return 0.0
-        return height_m * (1.0 - 0.88 * r) * (0.93 + 0.14 * bumps(dn * 2.5 + salt, de * 2.5))
+        return float(height_m * (1.0 - 0.88 * r) * (0.93 + 0.14 * bumps(dn * 2.5 + salt, de * 2.5)))
     ragged = bumps(dn * 1.1 + salt * 3.0, de * 1.1 - salt)
     r /= 0.78 + 0.37 * ragged
     if r >= 1.0:
@@ -138,10 +137,10 @@ def crown_up_m(dn: float, de: float, height_m: float, radius_m: float, kind: int
     dome = math.sqrt(1.0 - r * r * r)
     clumps = bumps(dn * 0.9 + salt, de * 0.9) + 0.6 * bumps(dn * 2.1, de * 2.1 + salt) - 0.8
     if kind == 0:
-        return height_m * (0.2 + 0.8 * dome) + clumps * min(1.6, 0.5 * radius_m) * dome
+        return float(height_m * (0.2 + 0.8 * dome) + clumps * min(1.6, 0.5 * radius_m) * dome)
     if kind == 2:
-        return height_m * (0.15 + 0.85 * dome) + 0.8 * clumps * dome
-    return max(0.1, height_m * dome * (1.0 + 0.4 * clumps))
+        return float(height_m * (0.15 + 0.85 * dome) + 0.8 * clumps * dome)
+    return float(max(0.1, height_m * dome * (1.0 + 0.4 * clumps)))
 
 
 @njit(nogil=True, cache=True, error_model="numpy")  # type: ignore[untyped-decorator]

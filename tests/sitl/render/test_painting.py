@@ -94,7 +94,7 @@ def test_bands_make_the_same_picture() -> None:
     whole, band = np.full((64, 64, 4), 170, dtype=np.uint8), np.full((32, 64, 4), 170, dtype=np.uint8)
     rest = (house_rows(HOUSES), ROOF_PALETTE)
     paint_houses(whole, *rest, CORNER, TEXEL, False)
-    paint_houses(band, *rest, CORNER + [8.0, 0.0], TEXEL, False)
+    paint_houses(band, *rest, CORNER + np.array([8.0, 0.0]), TEXEL, False)
     np.testing.assert_array_equal(whole[32:], band)
 
 

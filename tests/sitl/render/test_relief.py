@@ -133,7 +133,7 @@ def test_compiled_marching_equals_plain_python() -> None:
     rng = np.random.default_rng(5)
     hits = 0
     for _ in range(60):
-        ray = rng.normal(size=3) + [0.0, 0.0, -0.5]
+        ray = rng.normal(size=3) + np.array([0.0, 0.0, -0.5])
         arguments = (*fixed, *rng.uniform(-10, 10, 2), 11.0, *ray, 0.0, math.inf, 0.01)
         compiled = march(*arguments)
         assert compiled == pytest.approx(march.py_func(*arguments), rel=1e-6, abs=1e-9)
@@ -148,13 +148,13 @@ def test_compiled_marching_equals_plain_python() -> None:
 def test_compiled_depths_equal_plain_python() -> None:
     surface = surface_of(scene(buildings=(HOUSE,)))
     relief = Relief.of(surface)
-    v, u = np.mgrid[0:25, 0:33].astype(np.float32)
-    rays = np.stack([(u - 16) / 20, (v - 12) / 20])
+    v, u = np.mgrid[0:33, 0:49].astype(np.float32)
+    rays = np.stack([(u - 24) / 20, (v - 16) / 20])
     centre, ned_from_camera = camera_pose(Pose(0, 3.0, 1.0, -14.0, (0.98, 0.1, -0.12, 0.1)), CameraMount())
     results = []
     for kernel in (find_inverse_depth, find_inverse_depth.py_func):
-        inverse, marched = np.empty((25, 33), np.float32), np.zeros((25, 33), np.uint8)
-        odd, is_edge = np.zeros((12, 16), np.float32), np.zeros((6, 8), np.uint8)
+        inverse, marched = np.empty((33, 49), np.float32), np.zeros((33, 49), np.uint8)
+        odd, is_edge = np.zeros((16, 24), np.float32), np.zeros((8, 12), np.uint8)
         kernel(
             inverse, is_edge, marched, odd, rays, relief.up_m, relief.highest_m, relief.levels, relief.leaf_m,
             relief.place, relief.far_m, relief.is_flat, centre, ned_from_camera, 20.0,
