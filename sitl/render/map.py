@@ -1,5 +1,8 @@
 """A map of the world: the ground and the line seen from straight above, for pictures of a flight."""
 
+import dataclasses
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -30,6 +33,7 @@ def render_map(world: World, bounds_ne_m: tuple[float, float, float, float], px_
     f_px = px_per_m * _ABOVE_M
     # A camera far above sees every height at nearly the same scale; the ground's is exact.
     camera = Intrinsics(width_px, height_px, f_px, f_px, (width_px - 1) / 2.0, (height_px - 1) / 2.0)
-    renderer = Renderer(world, camera, optics=_FLAWLESS, wire_at_least_m=_WIRE_PX / px_per_m)
+    clear = dataclasses.replace(world, light=dataclasses.replace(world.light, visibility_m=math.inf))
+    renderer = Renderer(clear, camera, optics=_FLAWLESS, wire_at_least_m=_WIRE_PX / px_per_m)
     north_m, east_m = (north_min_m + north_max_m) / 2.0, (east_min_m + east_max_m) / 2.0
     return renderer.render(Pose(0, north_m, east_m, -_ABOVE_M, (1.0, 0.0, 0.0, 0.0)), 0)

@@ -96,6 +96,7 @@ def _edge_px(
 def draw_members(
     coverage: NDArray[np.float32],
     shaded: NDArray[np.float32],
+    strips: NDArray[np.float64],
     members: NDArray[np.float64],
     is_ribbon: bool,
     material: NDArray[np.float64],
@@ -105,9 +106,11 @@ def draw_members(
     lens: NDArray[np.float64],
     reach: NDArray[np.float64],
 ) -> int:
-    """Draw straight members into a layer and return how many of them are in view.
+    """Draw straight members into a layer and return how many strips they became.
 
-    `coverage`, `shaded`: see add_strip. `members` is (n, 9): both ends NED [m], both diameters [m], and a
+    `coverage`, `shaded`: see add_strip. `strips` (m, 8) is written: each strip as add_strip takes it, and the inverse
+    depth [1/m] at its start and end; what would be more than m strips is not drawn.
+    `members` is (n, 9): both ends NED [m], both diameters [m], and a
     brightness. Round ones are lit as cylinders by `material` = (ambient, direct, gloss) and a sun towards `sun_ned`
     (3,); ribbons lie flat on a horizontal plane and show their brightness alone. `centre` (3,) NED [m] and
     `camera_from_ned` (3, 3) are the camera's, `reach` is clip_to_view's.
@@ -120,14 +123,13 @@ def draw_members(
     strip, shading, edges = np.empty(6), np.zeros(6), np.empty((2, 2))
     is_bent = lens[4] != 0.0 or lens[5] != 0.0 or lens[6] != 0.0 or lens[7] != 0.0 or lens[8] != 0.0 or lens[9] != 0.0
 
-    n_seen = 0
+    n_strips = 0
     for k in range(members.shape[0]):
         _to_camera(members[k, 0:3], centre, camera_from_ned, p)
         _to_camera(members[k, 3:6], centre, camera_from_ned, q)
         first, last = clip_to_view(p, q, reach)
         if first >= last:
             continue
-        n_seen += 1
         length = math.sqrt((q[0] - p[0]) ** 2 + (q[1] - p[1]) ** 2 + (q[2] - p[2]) ** 2)
         for i in range(3):
             axis[i] = (q[i] - p[i]) / length
@@ -158,8 +160,15 @@ def draw_members(
                     for i in range(3):
                         lateral[i] = -lateral[i]
                 _light_cylinder(shading, lateral, axis, sight, sun, material, members[k, 8])
+            if n_strips == strips.shape[0]:
+                return n_strips
+            for i in range(6):
+                strips[n_strips, i] = strip[i]
+            strips[n_strips, 6] = (1.0 - piece / n_pieces) / z0 + piece / n_pieces / z1
+            strips[n_strips, 7] = (1.0 - (piece + 1) / n_pieces) / z0 + (piece + 1) / n_pieces / z1
+            n_strips += 1
             add_strip(coverage, shaded, strip, shading)
-    return n_seen
+    return n_strips
 
 
 @njit(nogil=True, cache=True)  # type: ignore[untyped-decorator]
@@ -210,33 +219,51 @@ def _light_cylinder(
 def draw_discs(
     coverage: NDArray[np.float32],
     shaded: NDArray[np.float32],
+    strips: NDArray[np.float64],
     discs: NDArray[np.float64],
     centre: NDArray[np.float64],
     camera_from_ned: NDArray[np.float64],
     lens: NDArray[np.float64],
 ) -> int:
-    """Lay discs, the tops of round members, over a layer and return how many of them are in view.
+    """Lay discs, the tops of round members, over a layer and return how many strips of `strips` tell where.
 
-    `discs` is (n, 5): centre NED [m], diameter [m], brightness; the rest as for draw_members. A disc is drawn as a
-    circle, as a camera that looks down sees a horizontal one.
+    `discs` is (n, 5): centre NED [m], diameter [m], brightness; the rest as for draw_members. A disc is a circle
+    flattened along the image of the vertical, as a camera sees a horizontal one.
     """
     height_px, width_px = coverage.shape
-    p = np.empty(3)
-    n_seen = 0
+    p, down = np.empty(3), camera_from_ned[:, 2]
+    n_strips = 0
     for k in range(discs.shape[0]):
         _to_camera(discs[k, 0:3], centre, camera_from_ned, p)
         # Beyond 60 degrees off the axis it is out of any image, and the lens model may fold back into it.
         if p[2] < NEAR_M or math.hypot(p[0], p[1]) > 1.75 * p[2]:
             continue
+        distance = math.sqrt(p[0] * p[0] + p[1] * p[1] + p[2] * p[2])
+        flat = (p[0] * down[0] + p[1] * down[1] + p[2] * down[2]) / distance
+        if flat <= 0.02 or n_strips == strips.shape[0]:  # from below, a top is not seen
+            continue
         x, y = project_point(p[0], p[1], p[2], lens)
         radius = 0.5 * discs[k, 3] * lens[0] / p[2]
         left, right = max(0, math.floor(x - radius - 1.0)), min(width_px - 1, math.ceil(x + radius + 1.0))
         top, bottom = max(0, math.floor(y - radius - 1.0)), min(height_px - 1, math.ceil(y + radius + 1.0))
-        n_seen += 1 if left <= right and top <= bottom else 0
-        thinness = min(1.0, math.pi * radius * radius)
+        if left > right or top > bottom:
+            continue
+        dx, dy = down[0] * p[2] - p[0] * down[2], down[1] * p[2] - p[1] * down[2]
+        norm = max(1e-9, math.hypot(dx, dy))
+        dx, dy = dx / norm, dy / norm
+        for i in range(8):
+            strips[n_strips, i] = 0.0
+        strips[n_strips, 0], strips[n_strips, 1] = x - radius, y
+        strips[n_strips, 3], strips[n_strips, 4] = x + radius, y
+        strips[n_strips, 2] = strips[n_strips, 5] = 2.0 * radius
+        strips[n_strips, 6] = strips[n_strips, 7] = 1.0 / p[2]
+        n_strips += 1
+        thinness = min(1.0, math.pi * radius * radius * flat)
         for v in range(top, bottom + 1):
             for u in range(left, right + 1):
-                part = ramp(radius - math.hypot(u - x, v - y)) * thinness
+                long = (u - x) * dx + (v - y) * dy
+                wide = (v - y) * dx - (u - x) * dy
+                part = ramp(radius - math.hypot(long / flat, wide)) * thinness
                 coverage[v, u] += part * (1.0 - coverage[v, u])
                 shaded[v, u] += part * (discs[k, 4] - shaded[v, u])
-    return n_seen
+    return n_strips

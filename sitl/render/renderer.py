@@ -4,36 +4,38 @@ import functools
 import itertools
 
 import numpy as np
-from numba import njit
 from numpy.typing import NDArray
 
 from drivers.camera.camera import Intrinsics
 from sitl.pose import Pose
-from sitl.render.ground import GroundTexture, GroundView
+from sitl.render.daylight import daylight_of, light_map
+from sitl.render.ground import GroundView
 from sitl.render.lens import CameraMount, camera_pose, lens_vector, ray_table
-from sitl.render.linework import build_layers
-from sitl.render.pasture import paint_pasture
-from sitl.render.projection import clip_to_view, draw_discs, draw_members, project_point
+from sitl.render.linework import build_linework
+from sitl.render.merge import draw_linework
+from sitl.render.paint import ground_of
+from sitl.render.projection import clip_to_view, project_point
+from sitl.render.relief import Relief
 from sitl.render.sensor import Optics, blur, develop, fall_off, noise_table, tone_curve
-from sitl.world.records import World
+from sitl.world.height_grid import HeightGrid
+from sitl.world.records import Light, World
+from sitl.world.surface import surface_of
 
 _REACH = 1.25  # members are drawn this much beyond the image, so that their width cannot be cut off
+_MOST_STRIPS = 1 << 14
 
 
-# Painting takes seconds, and all renderers of a process can share the result.
-_paint = functools.lru_cache(maxsize=2)(paint_pasture)
-
-
-def _ground_of(world: World) -> GroundTexture:
-    """Paint the world's ground, or take it from the last time."""
-    return _paint(world.ground, world.light, world.line.axis_ne_m)
+@functools.lru_cache(maxsize=4)
+def _stage(surface: HeightGrid, light: Light) -> tuple[Relief, NDArray[np.uint8]]:
+    """A surface made ready for rays, and its light; all renderers of a process share them."""
+    return Relief.of(surface), light_map(surface, light)
 
 
 class Renderer:
     """Renders a world for one camera; the same pose and `seq` give the same image, to the bit.
 
     `intrinsics` may have distortion; `mount` is where the camera sits on the vehicle; `seed` is the noise's.
-    `wire_at_least_m` is for maps: see sitl.render.linework.build_layers.
+    `wire_at_least_m` is for maps: see sitl.render.linework.build_linework.
     """
 
     def __init__(
@@ -47,53 +49,70 @@ class Renderer:
     ) -> None:
         self.intrinsics = intrinsics
         self._world = world
-        self._mount = CameraMount() if mount is None else mount
+        self.mount = CameraMount() if mount is None else mount
         self._optics = Optics() if optics is None else optics
         self._seed = seed
-        self._layers = build_layers(world, wire_at_least_m)
+        self._linework = build_linework(world, wire_at_least_m)
         self._sun_ned = np.array(world.light.direction_ned)
+        self._day = daylight_of(world.light)
         self._lens = lens_vector(intrinsics)
-        self._rays = ray_table(intrinsics)
-        self._ground = GroundView(_ground_of(world), self._rays, intrinsics.fx_px)
-        x, y = self._rays
+        self.rays = ray_table(intrinsics)
+        relief, shares = _stage(surface_of(world), world.light)
+        self._ground = GroundView(ground_of(world), relief, shares, self._day, self.rays, intrinsics.fx_px)
+        x, y = self.rays
         self._view = np.array([x.min(), x.max(), y.min(), y.max()], dtype=np.float64)
         shape = (intrinsics.height_px, intrinsics.width_px)
         self._light = np.empty((*shape, 3), dtype=np.float32)
         self._coverage = np.zeros(shape, dtype=np.float32)
         self._shaded = np.zeros(shape, dtype=np.float32)
+        self._strips = np.empty((_MOST_STRIPS, 8), dtype=np.float64)
         self._fall_off = fall_off(intrinsics.width_px, intrinsics.height_px, self._optics.corner_light)
         self._noise = noise_table(seed)
         self._tone = tone_curve()
 
+    def light(self, pose: Pose) -> NDArray[np.float32]:
+        """The light that comes through the lens at a pose: (height, width, 3) float32 linear BGR.
+
+        A matt surface in a clear noon's full light shows its albedo. The array is the renderer's own: the next call
+        writes into it.
+        """
+        self.ground_light(pose)
+        self.add_line(self._light, pose)
+        return self._light
+
+    def ground_light(self, pose: Pose) -> NDArray[np.float32]:
+        """What light() gives, without the linework; the next call of either overwrites it."""
+        self._ground.draw(self._light, *camera_pose(pose, self.mount))
+        return self._light
+
+    def add_line(self, light: NDArray[np.float32], pose: Pose) -> None:
+        """Draw the linework as it is seen from a pose over `light`, hidden by the ground that was looked at last.
+
+        That may have been from near there.
+        """
+        self._draw_lines(light, np.empty((0, 0), dtype=np.float32), *camera_pose(pose, self.mount))
+
+    def depth(self, pose: Pose) -> NDArray[np.float32]:
+        """How far each pixel sees at a pose: (height, width) float32 [m] along the optical axis; inf in the sky.
+
+        Ground, what stands on it, and of the linework what covers a twentieth of the pixel or more.
+        """
+        centre, ned_from_camera = camera_pose(pose, self.mount)
+        self._ground.look(centre, ned_from_camera)
+        nearest = self._ground.inverse[: self.intrinsics.height_px, : self.intrinsics.width_px].copy()
+        self._draw_lines(self._light, nearest, centre, ned_from_camera)
+        return np.where(nearest > 0.0, 1.0 / np.maximum(nearest, 1e-12), np.inf).astype(np.float32)
+
     def render(self, pose: Pose, seq: int) -> NDArray[np.uint8]:
         """The image (height, width, 3) uint8 BGR at a pose; `seq` chooses the noise."""
-        centre, ned_from_camera = camera_pose(pose, self._mount)
-        camera_from_ned = np.ascontiguousarray(ned_from_camera.T)
-        self._ground.draw(self._light, centre, ned_from_camera)
-        for layer in self._layers:
-            n_seen = draw_members(
-                self._coverage,
-                self._shaded,
-                layer.members,
-                layer.is_ribbon,
-                layer.material,
-                self._sun_ned,
-                centre,
-                camera_from_ned,
-                self._lens,
-                _REACH * self._view,
-            )
-            n_seen += draw_discs(self._coverage, self._shaded, layer.discs, centre, camera_from_ned, self._lens)
-            if n_seen:
-                merge_layer(self._light, self._coverage, self._shaded, layer.bgr, layer.is_shadow)
-        light = blur(self._light, self._optics.blur_px)
+        light = blur(self.light(pose), self._optics.blur_px)
         image = np.empty_like(light, dtype=np.uint8)
         rng = np.random.default_rng((self._seed, seq))
         row_starts = rng.integers(0, len(self._noise) - 3 * image.shape[1], len(image))
         develop(
             light.reshape(len(light), -1),
             self._fall_off,
-            self._world.light.direct + self._world.light.sky,
+            1.0,
             self._optics.read_noise,
             self._optics.shot_noise,
             self._noise,
@@ -103,13 +122,28 @@ class Renderer:
         )
         return image
 
+    def _draw_lines(
+        self,
+        light: NDArray[np.float32],
+        nearest: NDArray[np.float32],
+        centre: NDArray[np.float64],
+        ned_from_camera: NDArray[np.float64],
+    ) -> None:
+        lines = self._linework
+        draw_linework(
+            light, self._ground.inverse, nearest, self._coverage, self._shaded, self._strips,
+            lines.members, lines.discs, lines.spans, lines.looks, self._sun_ned, centre,
+            np.ascontiguousarray(ned_from_camera.T), self._lens, _REACH * self._view,
+            self._ground.shine, self._day.air_bgr, float(self._day.table[6, 0]),
+        )  # fmt: skip
+
     def project(self, pose: Pose) -> list[NDArray[np.float64]]:
         """Where the conductors truly are in the image at a pose.
 
         Returns for each conductor its visible part as (n, 4) float64 [px]: x1, y1, x2, y2 of straight pieces in the
         conductor's order, the centre of the first pixel at (0, 0); none of them where it is out of view.
         """
-        centre, ned_from_camera = camera_pose(pose, self._mount)
+        centre, ned_from_camera = camera_pose(pose, self.mount)
         pieces = []
         for conductor in self._world.conductors:
             points = (conductor.points_ned_m - centre) @ ned_from_camera
@@ -121,33 +155,3 @@ class Renderer:
                     rows.append([*project_point(*a, self._lens), *project_point(*b, self._lens)])
             pieces.append(np.array(rows, dtype=np.float64).reshape(-1, 4))
         return pieces
-
-
-@njit(nogil=True, cache=True)  # type: ignore[untyped-decorator]
-def merge_layer(
-    light: NDArray[np.float32],
-    coverage: NDArray[np.float32],
-    shaded: NDArray[np.float32],
-    bgr: NDArray[np.float64],
-    is_shadow: bool,
-) -> None:
-    """Blend a layer of colour `bgr` (3,) into `light` (height, width, 3), in linear light, and empty it.
-
-    `coverage` and `shaded` are (height, width) float32 as add_strip leaves them. Where pieces overlap, the coverage
-    adds up to more than 1 and counts as 1. A shadow's `bgr` is the light that is left where it is full.
-    """
-    for v in range(coverage.shape[0]):
-        for u in range(coverage.shape[1]):
-            part = coverage[v, u]
-            if part == 0.0:
-                continue
-            bright = shaded[v, u]
-            if part > 1.0:
-                bright /= part
-                part = np.float32(1.0)
-            coverage[v, u] = shaded[v, u] = 0.0
-            for c in range(3):
-                if is_shadow:
-                    light[v, u, c] *= np.float32(1.0 - min(1.0, bright) * (1.0 - bgr[c]))
-                else:
-                    light[v, u, c] = np.float32(light[v, u, c] * (1.0 - part) + bright * bgr[c])

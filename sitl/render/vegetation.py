@@ -1,132 +1,103 @@
-"""Paints bushes and trees, seen from above, with the shadows they cast on the ground."""
+"""Paints crowns where they stand, and the litter and shade-loving growth below them."""
 
-import math
-from dataclasses import dataclass
-
-import cv2
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
-from sitl.world.records import Light
+from sitl.render.colour import stored
+from sitl.render.fields import rise
+from sitl.world.surface import bumps, crown_up_m, lattice
 
-_HEIGHT_PER_RADIUS = 1.5
-_N_SHAPES = 4
-_LEAF_BGR = np.array([0.175, 0.345, 0.275])  # as the texture stores colour: square roots of linear light
-
-
-@dataclass(frozen=True, slots=True)
-class Plant:
-    """A bush or a tree: place [m] from the texture's corner, crown radius [m]."""
-
-    north_m: float
-    east_m: float
-    radius_m: float
-
-
-def paint_plants(
-    picture: NDArray[np.uint8], plants: list[Plant], texel_m: float, sun: Light, rng: np.random.Generator
-) -> None:
-    """Paint plants into `picture` (side, side, 4) uint8 (GroundTexture.surface), over all of whose edges they wrap."""
-    # A few shapes of each size do for all; growing one takes longer than painting it.
-    stock: dict[tuple[int, int], NDArray[np.float32]] = {}
-    crowns = []
-    for k, plant in enumerate(plants):
-        shape = (round(10.0 * plant.radius_m), k % _N_SHAPES)
-        if shape not in stock:
-            stock[shape] = _crown(shape[0] / 10.0, texel_m, rng)
-        crowns.append(stock[shape])
-    for plant, crown in zip(plants, crowns, strict=True):
-        _paint_shadow(picture, plant, crown, texel_m, sun)
-    for plant, crown in zip(plants, crowns, strict=True):
-        _paint_crown(picture, plant, crown, texel_m, sun, rng)
+CROWN_PALETTE = np.array(
+    [
+        stored(84, 110, 48),  # broadleaf
+        stored(52, 78, 46),  # conifer
+        stored(100, 122, 58),  # poplar
+        stored(88, 108, 52),  # bush
+        stored(96, 84, 58),  # litter
+        stored(140, 120, 62),  # leaves that turn
+    ],
+    dtype=np.float64,
+)
 
 
-def _crown(radius_m: float, texel_m: float, rng: np.random.Generator) -> NDArray[np.float32]:
-    """Heap clumps of leaves into a dome: the height of a crown above its lower edge [m], (n, n) float32; 0 outside."""
-    half = math.ceil(1.25 * radius_m / texel_m) + 2
-    steps = (np.arange(-half, half + 1) * texel_m).astype(np.float32)
-    height = np.zeros((len(steps), len(steps)), dtype=np.float32)
-    n_clumps = int(14 + 26 * radius_m)
-    for _ in range(n_clumps):
-        out = radius_m * math.sqrt(rng.uniform(0.0, 0.8))
-        turn = rng.uniform(0.0, 2.0 * math.pi)
-        size = radius_m * rng.uniform(0.14, 0.30) + 0.05
-        top = radius_m * math.sqrt(1.0 - (out / (1.15 * radius_m)) ** 2)
-        dn, de = steps - out * math.cos(turn), steps - out * math.sin(turn)
-        i, j = np.flatnonzero(np.abs(dn) < size), np.flatnonzero(np.abs(de) < size)
-        if len(i) == 0 or len(j) == 0:
-            continue
-        inside = size**2 - dn[i, None] ** 2 - de[None, j] ** 2
-        clump = np.where(inside > 0.0, top - size + np.sqrt(np.maximum(inside, 0.0)) * 1.2, 0.0)
-        window = height[i[0] : i[-1] + 1, j[0] : j[-1] + 1]
-        np.maximum(window, clump, out=window)
-    rough = rng.standard_normal(height.shape, dtype=np.float32)
-    bumps = cv2.GaussianBlur(rough, (0, 0), 1.2)
-    return np.where(height > 0.0, np.maximum(0.02, height + 0.16 * bumps * (0.5 + 0.5 * radius_m)), 0.0).astype(
-        np.float32
-    )
-
-
-def _window(
-    picture: NDArray[np.uint8], plant: Plant, shape: tuple[int, ...], texel_m: float, shift_m: tuple[float, float]
-) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-    """Rows and columns of the picture under a patch of that shape, centred at the plant and shifted."""
-    side = picture.shape[0]
-    row = round((plant.north_m + shift_m[0]) / texel_m) - shape[0] // 2
-    column = round((plant.east_m + shift_m[1]) / texel_m) - shape[1] // 2
-    return (row + np.arange(shape[0]))[:, None] % side, (column + np.arange(shape[1]))[None, :] % side
-
-
-def _paint_shadow(
-    picture: NDArray[np.uint8], plant: Plant, crown: NDArray[np.float32], texel_m: float, sun: Light
-) -> None:
-    """Darken the ground where the crown, swept from its lower edge to its top, stands before the sun."""
-    reach_m = _HEIGHT_PER_RADIUS * plant.radius_m / math.tan(sun.elevation_rad)
-    pad = math.ceil(reach_m / texel_m) + 4
-    mask = np.pad((crown > 0.0).astype(np.float32), pad)
-    north, east = -math.cos(sun.azimuth_rad), -math.sin(sun.azimuth_rad)
-    shadow = np.zeros_like(mask)
-    for part in (0.0, 0.35, 0.7, 1.0):
-        shift_px = (0.35 + 0.65 * part) * reach_m / texel_m
-        # The crown narrows to its top.
-        size = math.sqrt(1.0 - 0.8 * part**2)
-        centre = (mask.shape[1] - 1) / 2.0
-        move = np.array(
-            [
-                [size, 0.0, centre * (1.0 - size) + east * shift_px],
-                [0.0, size, centre * (1.0 - size) + north * shift_px],
-            ]
-        )
-        np.maximum(shadow, cv2.warpAffine(mask, move, mask.shape[::-1], flags=cv2.INTER_LINEAR), out=shadow)
-    soft = cv2.GaussianBlur(shadow, (0, 0), 1.0 + 0.4 * plant.radius_m)
-    where = _window(picture, plant, soft.shape, texel_m, (0.0, 0.0))
-    light = 1.0 - soft[..., None] * np.array([0.36, 0.42, 0.46], dtype=np.float32)
-    below = picture[where]
-    below[..., :3] = (below[..., :3] * light + 0.5).astype(np.uint8)
-    picture[where] = below
-
-
-def _paint_crown(
+@njit(nogil=True, cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+def paint_litter(
     picture: NDArray[np.uint8],
-    plant: Plant,
-    crown: NDArray[np.float32],
-    texel_m: float,
-    sun: Light,
-    rng: np.random.Generator,
+    trees: NDArray[np.float64],
+    palette: NDArray[np.float64],
+    corner_m: NDArray[np.float64],
+    texel_m: NDArray[np.float64],
 ) -> None:
-    """Paint a crown, lit by the sun and darker in the hollows between its clumps."""
-    slope_north, slope_east = np.gradient(crown, texel_m)
-    toward = sun.direction_ned
-    norm = np.sqrt(1.0 + slope_north**2 + slope_east**2)
-    lit = np.maximum(0.0, (-slope_north * toward[0] - slope_east * toward[1] - toward[2]) / norm)
-    hollow = crown - cv2.GaussianBlur(crown, (0, 0), 0.25 / texel_m)
-    light = (0.42 + 0.62 * lit) * np.clip(1.0 + 0.9 * hollow / (0.2 + 0.25 * plant.radius_m), 0.45, 1.25)
-    light *= 0.82 + 0.18 * np.minimum(1.0, crown / (0.7 * plant.radius_m))
-    colour = _LEAF_BGR * rng.uniform(0.85, 1.15) * (1.0 + rng.normal(0.0, [0.03, 0.03, 0.08]))
-    paint = 255.0 * np.sqrt(light)[..., None] * colour * 1.15
-    alpha = cv2.GaussianBlur((crown > 0.0).astype(np.float32), (0, 0), 0.7)[..., None]
-    where = _window(picture, plant, crown.shape, texel_m, (0.0, 0.0))
-    below = picture[where].astype(np.float32)
-    below[..., :3] += alpha * (paint - below[..., :3])
-    below[..., 3:] += alpha * (255.0 - below[..., 3:])
-    picture[where] = np.clip(below + 0.5, 0.0, 255.0).astype(np.uint8)
+    """Lay litter below and round the crowns of `trees` (tree_rows); the rest as for paint_crowns."""
+    for k in range(trees.shape[0]):
+        if trees[k, 4] == 3.0:
+            continue
+        reach = 1.5 * trees[k, 3]
+        for i in range(
+            max(0, int((trees[k, 0] - reach - corner_m[0]) / texel_m[0])),
+            min(picture.shape[0], int((trees[k, 0] + reach - corner_m[0]) / texel_m[0]) + 1),
+        ):
+            north_m = corner_m[0] + (i + 0.5) * texel_m[0]
+            for j in range(
+                max(0, int((trees[k, 1] - reach - corner_m[1]) / texel_m[1])),
+                min(picture.shape[1], int((trees[k, 1] + reach - corner_m[1]) / texel_m[1]) + 1),
+            ):
+                east_m = corner_m[1] + (j + 0.5) * texel_m[1]
+                r = ((north_m - trees[k, 0]) ** 2 + (east_m - trees[k, 1]) ** 2) ** 0.5 / trees[k, 3]
+                part = 0.6 * rise(1.45, 0.7, r + 0.5 * (bumps(north_m * 0.9, east_m * 0.9) - 0.5))
+                if part <= 0.0:
+                    continue
+                shade = 0.85 + 0.3 * lattice(i, j)
+                for c in range(3):
+                    value = picture[i, j, c] + part * (255.0 * palette[4, c] * shade - picture[i, j, c])
+                    picture[i, j, c] = int(min(255.0, value + 0.5))
+                picture[i, j, 3] = int(picture[i, j, 3] + part * (120.0 - picture[i, j, 3]) + 0.5)
+
+
+@njit(nogil=True, cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+def paint_crowns(
+    picture: NDArray[np.uint8],
+    trees: NDArray[np.float64],
+    palette: NDArray[np.float64],
+    corner_m: NDArray[np.float64],
+    texel_m: NDArray[np.float64],
+) -> None:
+    """Paint the crowns of `trees` (sitl.world.surface.tree_rows), the lowest first, into `picture` (rows, columns, 4).
+
+    `palette` is CROWN_PALETTE, `corner_m` the picture's south and west, `texel_m` its texels' sides (north, east).
+    """
+    tint = np.empty(3)
+    for k in range(trees.shape[0]):
+        height_m, radius_m, kind = trees[k, 2], trees[k, 3], int(trees[k, 4])
+        salt = 100.0 * lattice(int(8.0 * trees[k, 0]), int(8.0 * trees[k, 1]))
+        age, turned = lattice(int(salt * 91.0), 3), lattice(int(salt * 57.0), 5)
+        turned = 0.55 * rise(0.8, 1.0, turned) if kind != 1 else 0.0
+        for c in range(3):
+            tint[c] = palette[kind, c] + turned * (palette[5, c] - palette[kind, c])
+            tint[c] *= 0.86 + 0.28 * age + 0.05 * (lattice(int(salt * 13.0), 7 + c) - 0.5)
+        reach = 1.15 * radius_m + 0.2
+        for i in range(
+            max(0, int((trees[k, 0] - reach - corner_m[0]) / texel_m[0])),
+            min(picture.shape[0], int((trees[k, 0] + reach - corner_m[0]) / texel_m[0]) + 1),
+        ):
+            dn = corner_m[0] + (i + 0.5) * texel_m[0] - trees[k, 0]
+            for j in range(
+                max(0, int((trees[k, 1] - reach - corner_m[1]) / texel_m[1])),
+                min(picture.shape[1], int((trees[k, 1] + reach - corner_m[1]) / texel_m[1]) + 1),
+            ):
+                de = corner_m[1] + (j + 0.5) * texel_m[1] - trees[k, 1]
+                # The surface's grid widens a crown by up to a cell: its steep side must not show the ground's colour.
+                crown = crown_up_m(0.96 * dn, 0.96 * de, height_m, radius_m, kind, salt)
+                if crown <= 0.0:
+                    continue
+                # Sprays of leaves catch light of their own; between them one looks into the dark.
+                spray = bumps(dn * 3.1 + salt, de * 3.1) + 0.7 * bumps(dn * 7.3, de * 7.3 + salt) - 0.85
+                gap = rise(0.15, -0.35, spray + 0.35 * (lattice(i, j) - 0.5))
+                r = min(1.0, (dn * dn + de * de) ** 0.5 / radius_m)
+                shade = (1.0 + 0.32 * spray + 0.16 * (lattice(i, j + 50) - 0.5)) * (1.0 - 0.42 * gap)
+                shade *= 1.06 - 0.16 * r
+                for c in range(3):
+                    warm = 1.0 + 0.06 * spray * (1.0 if c == 2 else 0.0)
+                    picture[i, j, c] = int(min(255.0, max(0.0, 255.0 * tint[c] * shade * warm + 0.5)))
+                picture[i, j, 3] = 255

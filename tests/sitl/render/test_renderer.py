@@ -13,15 +13,16 @@ from numpy.typing import NDArray
 
 from drivers.camera.camera import Intrinsics
 from sitl.pose import Pose
-from sitl.render.ground import build_texture, dither, light_ground, map_ground
 from sitl.render.lens import CameraMount, camera_pose, lens_vector, pinhole, ray_table
-from sitl.render.linework import build_layers, cast_shadow
+from sitl.render.linework import build_linework, cast_shadow
 from sitl.render.map import render_map
+from sitl.render.merge import DECAL, ROUND, SHADOW
 from sitl.render.projection import project_point
-from sitl.render.renderer import Renderer, merge_layer
+from sitl.render.renderer import Renderer
 from sitl.render.sensor import Optics, develop, fall_off, noise_table, tone_curve
 from sitl.world.file import load_world
-from sitl.world.records import Conductor, World
+from sitl.world.height_grid import HeightGrid
+from sitl.world.records import Conductor, Strip, World
 
 FLAWLESS = Optics(blur_px=0.0, corner_light=1.0, read_noise=0.0, shot_noise=0.0)
 CAMERA = pinhole(320, 240, math.radians(70.0))
@@ -204,18 +205,50 @@ def test_the_ground_has_contrast_at_every_height() -> None:
 def test_a_shadow_takes_away_as_much_sun_as_its_wire_stops() -> None:
     sun_ned = np.array([0.0, 0.6, -0.8])
     wire = np.array([[3.0, 0.0, -8.0, 7.0, 0.0, -8.0, 0.014, 0.014, 1.0]])
-    (shadow,) = cast_shadow(wire, sun_ned)
+    (shadow,) = cast_shadow(wire, sun_ned, HeightGrid.flat(-50.0, -50.0, 50.0, 50.0))
     assert shadow[:6] == pytest.approx([3.0, -6.0, 0.0, 7.0, -6.0, 0.0])
     assert shadow[6] == pytest.approx(10.0 * math.radians(0.53))
     assert shadow[6] * shadow[8] == pytest.approx(0.014)
 
 
-def test_every_support_has_its_members() -> None:
-    shadows, poles, arms, pins, wires = build_layers(world())
-    assert len(poles.members) == len(poles.discs) == len(arms.members) == 9
-    assert len(pins.members) == 27
-    assert len(wires.members) == 3 * 8 * 90
-    assert len(shadows.members) == 9 + 9 + 27 + len(wires.members)
+def test_a_shadow_falls_on_the_slope_that_is_there() -> None:
+    """The ground rises by 0.1 to the west, where the shadow falls: it meets the sun's ray sooner than a level one."""
+    sun_ned = np.array([0.0, 0.6, -0.8])
+    up_m = np.tile(-0.1 * np.arange(-50.0, 51.0), (101, 1))
+    wire = np.array([[0.0, 0.0, -8.0, 4.0, 0.0, -8.0, 0.014, 0.014, 1.0]])
+    (shadow,) = cast_shadow(wire, sun_ned, HeightGrid(-50.0, -50.0, 1.0, up_m))
+    away_m = 8.0 / (0.8 / 0.6 + 0.1)
+    assert shadow[[1, 4]] == pytest.approx([-away_m, -away_m], abs=1e-3)
+    assert shadow[[2, 5]] == pytest.approx([-0.1 * away_m, -0.1 * away_m], abs=1e-3)
+
+
+def test_every_object_has_its_members() -> None:
+    lines = build_linework(world())
+    kinds = lines.looks[:, 6].astype(int)
+    assert set(kinds) == {ROUND, SHADOW}
+    assert lines.spans[-1, 1] == len(lines.members)
+    assert np.all(lines.spans[1:, 0] == lines.spans[:-1, 1])
+    uprights = [m for s in world().supports for m in s.members if m.start_ned_m[:2] == m.end_ned_m[:2]]
+    assert len(lines.discs) == len([m for m in uprights if m.end_ned_m[2] < m.start_ned_m[2]])
+    for (first, last, *_), look in zip(lines.spans, lines.looks, strict=True):
+        ends = lines.members[first:last, :6].reshape(-1, 3)
+        assert np.all(np.linalg.norm(ends - look[7:10], axis=1) <= look[10] + 1e-9)
+    fine = sum(last - first for (first, last, *_), look in zip(lines.spans, lines.looks, strict=True) if look[14] < 1e3)
+    assert fine == sum(len(c.points_ned_m) - 1 for c in world().conductors)
+
+
+def test_a_road_has_lines_and_a_railway_rails() -> None:
+    points = ((-40.0, -40.0), (0.0, 0.0), (40.0, 0.0))
+    strips = (Strip("road", points, 6.0), Strip("railway", points, 4.0), Strip("fence", points, 0.1))
+    lines = build_linework(dataclasses.replace(NO_WIRE, strips=strips))
+    decals = np.concatenate(
+        [lines.members[a:b] for (a, b, *_), k in zip(lines.spans, lines.looks[:, 6], strict=True) if k == DECAL]
+    )
+    away_m = np.abs(decals[decals[:, 0] > 5.0][:, 1])
+    assert set(np.round(away_m, 2)) == {0.0, 2.78}
+    rails = lines.members[(lines.members[:, 6] == 0.075) & (lines.members[:, 8] == 1.0)]
+    north = rails[(rails[:, 0] > 5.0) & (rails[:, 2] < -0.1)]
+    assert set(np.round(np.abs(north[:, 1]), 4)) == {0.7175}
 
 
 def test_a_map_shows_the_line_where_it_runs() -> None:
@@ -247,56 +280,6 @@ def test_a_mount_must_be_a_rotation() -> None:
 def test_an_impossible_pinhole_is_refused(arguments: tuple[int, int, float]) -> None:
     with pytest.raises(ValueError, match="not"):
         pinhole(*arguments)
-
-
-def test_a_texture_keeps_its_brightness_over_all_levels() -> None:
-    picture = np.random.default_rng(1).integers(0, 256, (64, 64, 4), dtype=np.uint8)
-    texture = build_texture(picture, 0.1)
-    assert [int(side) for side in texture.levels[:, 2]] == [64, 32, 16, 8, 4]
-    for row, column, side in texture.levels.astype(int):
-        level = texture.atlas[row : row + side, column : column + side]
-        assert level.mean() == pytest.approx(picture.mean(), abs=0.6)
-        np.testing.assert_array_equal(texture.atlas[row + side, column : column + side], level[0])
-    with pytest.raises(ValueError, match="square"):
-        build_texture(picture[:, :60], 0.1)
-
-
-def test_compiled_ground_kernels_equal_plain_python() -> None:
-    camera: Intrinsics = pinhole(40, 30, 1.3)
-    texture = build_texture(np.random.default_rng(2).integers(0, 256, (64, 64, 4), dtype=np.uint8), 0.4)
-    centre, ned_from_camera = camera_pose(Pose(0, 3.0, -50.0, -9.0, turned(0.7, 1.2, -0.3)), CameraMount())
-    maps = []
-    for kernel in (map_ground, map_ground.py_func):
-        columns, rows = np.empty((2, 30, 40), dtype=np.float32)
-        kernel(
-            columns, rows, ray_table(camera), dither(40, 30), centre, ned_from_camera, camera.fx_px,
-            texture.levels, texture.texel_m,
-        )  # fmt: skip
-        maps.append(np.stack([columns, rows]))
-    assert maps[0].min() == -10.0  # some of it is sky
-    np.testing.assert_allclose(maps[0], maps[1], atol=2e-3)
-
-    surface, detail = np.random.default_rng(3).integers(0, 256, (2, 30, 40, 4), dtype=np.uint8)
-    lights = np.empty((2, 30, 40, 3), dtype=np.float32)
-    light_ground(lights[0], surface, detail)
-    light_ground.py_func(lights[1], surface, detail)
-    np.testing.assert_allclose(lights[0], lights[1], rtol=1e-5)
-
-
-@pytest.mark.parametrize("is_shadow", [False, True])
-def test_compiled_merging_equals_plain_python(is_shadow: bool) -> None:
-    rng = np.random.default_rng(4)
-    light, coverage = rng.random((12, 16, 3), dtype=np.float32), 1.4 * rng.random((12, 16), dtype=np.float32)
-    coverage[rng.random((12, 16)) < 0.5] = 0.0
-    results = []
-    for kernel in (merge_layer, merge_layer.py_func):
-        mine, layer, shaded = light.copy(), coverage.copy(), 0.7 * coverage
-        kernel(mine, layer, shaded, np.array([0.2, 0.4, 0.6]), is_shadow)
-        assert not layer.any()
-        assert not shaded.any()
-        results.append(mine)
-    np.testing.assert_allclose(results[0], results[1], rtol=1e-5)
-    assert np.any(results[0] != light)
 
 
 def test_compiled_developing_equals_plain_python() -> None:

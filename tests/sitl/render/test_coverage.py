@@ -93,16 +93,19 @@ def test_the_compiled_members_equal_plain_python(distortion: tuple[float, ...], 
     )
     discs = np.array([[-0.3, 0.6, -2.0, 0.5, 0.9]])
     view = np.array([-0.8, 0.8, -0.6, 0.6])
-    layers = []
+    layers, found = [], []
     for draw, draw_tops in ((draw_members, draw_discs), (draw_members.py_func, draw_discs.py_func)):
         layer = np.zeros((2, 36, 48), dtype=np.float32)
         camera_from_ned = np.ascontiguousarray(ned_from_camera.T)
+        strips = np.zeros((200, 8))
         n = draw(
-            layer[0], layer[1], members, is_ribbon, np.array([0.3, 0.6, 0.5]), np.array([0.5, 0.2, -0.84]),
+            layer[0], layer[1], strips, members, is_ribbon, np.array([0.3, 0.6, 0.5]), np.array([0.5, 0.2, -0.84]),
             centre, camera_from_ned, lens, view,
         )  # fmt: skip
-        n += draw_tops(layer[0], layer[1], discs, centre, camera_from_ned, lens)
+        n += draw_tops(layer[0], layer[1], strips[n:], discs, centre, camera_from_ned, lens)
         assert n >= 3
         layers.append(layer)
+        found.append(strips)
     assert layers[0][0].max() > 0.5
     np.testing.assert_allclose(layers[0], layers[1], atol=1e-5)
+    np.testing.assert_allclose(found[0], found[1], atol=1e-6)
