@@ -9,12 +9,13 @@ from numpy.typing import NDArray
 
 from drivers.camera.camera import Intrinsics
 from sitl.pose import Pose
+from sitl.render.exposure import SUNNY, Exposure
 from sitl.render.ground import GroundTexture, GroundView
 from sitl.render.lens import CameraMount, camera_pose, lens_vector, ray_table
 from sitl.render.linework import build_layers
 from sitl.render.pasture import paint_pasture
 from sitl.render.projection import clip_to_view, draw_discs, draw_members, project_point
-from sitl.render.sensor import Optics, blur, develop, fall_off, noise_table, tone_curve
+from sitl.render.sensor import Optics, Sensor
 from sitl.world.records import World
 
 _REACH = 1.25  # members are drawn this much beyond the image, so that their width cannot be cut off
@@ -48,8 +49,6 @@ class Renderer:
         self.intrinsics = intrinsics
         self._world = world
         self._mount = CameraMount() if mount is None else mount
-        self._optics = Optics() if optics is None else optics
-        self._seed = seed
         self._layers = build_layers(world, wire_at_least_m)
         self._sun_ned = np.array(world.light.direction_ned)
         self._lens = lens_vector(intrinsics)
@@ -61,12 +60,22 @@ class Renderer:
         self._light = np.empty((*shape, 3), dtype=np.float32)
         self._coverage = np.zeros(shape, dtype=np.float32)
         self._shaded = np.zeros(shape, dtype=np.float32)
-        self._fall_off = fall_off(intrinsics.width_px, intrinsics.height_px, self._optics.corner_light)
-        self._noise = noise_table(seed)
-        self._tone = tone_curve()
+        self.sensor = Sensor(self._rays, Optics() if optics is None else optics, seed)
 
-    def render(self, pose: Pose, seq: int) -> NDArray[np.uint8]:
+    def render(self, pose: Pose, seq: int, exposure: Exposure = SUNNY) -> NDArray[np.uint8]:
         """The image (height, width, 3) uint8 BGR at a pose; `seq` chooses the noise."""
+        return self.sensor.expose(self.light(pose), exposure, seq, self.sun_camera(pose))
+
+    def sun_camera(self, pose: Pose) -> NDArray[np.float64]:
+        """Towards the sun, (3,) in the camera frame, as long as its light is bright (Light.direct)."""
+        _, ned_from_camera = camera_pose(pose, self._mount)
+        return self._world.light.direct * (self._sun_ned @ ned_from_camera)
+
+    def light(self, pose: Pose) -> NDArray[np.float32]:
+        """The light (height, width, 3) float32 linear BGR that comes to the camera; the next call overwrites it.
+
+        Its unit is a white sheet at a clear noon; a darker hour's light is less.
+        """
         centre, ned_from_camera = camera_pose(pose, self._mount)
         camera_from_ned = np.ascontiguousarray(ned_from_camera.T)
         self._ground.draw(self._light, centre, ned_from_camera)
@@ -86,22 +95,10 @@ class Renderer:
             n_seen += draw_discs(self._coverage, self._shaded, layer.discs, centre, camera_from_ned, self._lens)
             if n_seen:
                 merge_layer(self._light, self._coverage, self._shaded, layer.bgr, layer.is_shadow)
-        light = blur(self._light, self._optics.blur_px)
-        image = np.empty_like(light, dtype=np.uint8)
-        rng = np.random.default_rng((self._seed, seq))
-        row_starts = rng.integers(0, len(self._noise) - 3 * image.shape[1], len(image))
-        develop(
-            light.reshape(len(light), -1),
-            self._fall_off,
-            self._world.light.direct + self._world.light.sky,
-            self._optics.read_noise,
-            self._optics.shot_noise,
-            self._noise,
-            row_starts,
-            self._tone,
-            image.reshape(len(image), -1),
-        )
-        return image
+        level = self._world.light.direct + self._world.light.sky
+        if level != 1.0:
+            self._light *= np.float32(level)
+        return self._light
 
     def project(self, pose: Pose) -> list[NDArray[np.float64]]:
         """Where the conductors truly are in the image at a pose.
