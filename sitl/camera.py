@@ -9,6 +9,8 @@ from drivers.camera.mailbox import Mailbox
 from drivers.clock import NS_PER_S, ScaledClock
 from sitl.pose import Pose, PoseBlock
 from sitl.render.lens import CameraMount
+from sitl.render.motion import Motion, Shutter, motion_between
+from sitl.render.photographer import Photographer
 from sitl.render.renderer import Renderer
 from sitl.render.sensor import Optics
 from sitl.world.file import WorldError, load_world
@@ -21,7 +23,8 @@ class SimCamera:
 
     `world` names the world (sitl.world.load_world), `pose_block` the shared memory that the vehicle writes its pose to.
     Frames come at `rate_hz` of the clock's flight time, as far as the rendering keeps up; those it misses
-    count in `seq`. `seed` is that of the sensor's noise. Entering it paints the world and compiles, which takes
+    count in `seq`. `seed` is that of the sensor's noise; `shutter` says how the frames are exposed while the vehicle moves,
+    whose motion is that from one frame's pose to the next one's. Entering it paints the world and compiles, which takes
     seconds, and raises CameraError when the world or the pose block is not there.
     """
 
@@ -36,6 +39,7 @@ class SimCamera:
         *,
         mount: CameraMount | None = None,
         optics: Optics | None = None,
+        shutter: Shutter | None = None,
     ) -> None:
         self._world = world
         self._pose_block = pose_block
@@ -45,6 +49,7 @@ class SimCamera:
         self._seed = seed
         self._mount = mount
         self._optics = optics
+        self._shutter = shutter
         self._mailbox: Mailbox[Frame] = Mailbox()
         self._stop = threading.Event()
         self._thread: threading.Thread | None = None
@@ -69,10 +74,10 @@ class SimCamera:
         except WorldError as error:
             poses.close()
             raise CameraError(str(error)) from error
-        renderer.render(Pose(0, 0.0, 0.0, -1.0, (1.0, 0.0, 0.0, 0.0)), 0)  # compiles, before time counts
+        self._compile(renderer)
         self._mailbox = Mailbox()
         self._stop.clear()
-        self._thread = threading.Thread(target=self._grab, args=(renderer, poses), name="sim-camera", daemon=True)
+        self._thread = threading.Thread(target=self._grab, args=(Photographer(renderer, self._shutter), poses), name="sim-camera", daemon=True)
         self._thread.start()
         return self
 
@@ -85,11 +90,18 @@ class SimCamera:
             self._thread = None
         self._mailbox.close()
 
-    def _grab(self, renderer: Renderer, poses: PoseBlock) -> None:
-        """Render a frame at each frame time that is not over yet; runs in the grabber thread until told to stop."""
+    def _compile(self, renderer: Renderer) -> None:
+        """Take a picture that is blurred and one that is not, before time counts."""
+        pose = Pose(0, 0.0, 0.0, -1.0, (1.0, 0.0, 0.0, 0.0))
+        for speed_m_s in (0.0, 100.0):
+            Photographer(renderer, self._shutter).take(Motion(pose, (speed_m_s, 0.0, 0.0)), 0)
+
+    def _grab(self, photographer: Photographer, poses: PoseBlock) -> None:
+        """Take a frame at each frame time that is not over yet; runs in the grabber thread until told to stop."""
         period_ns = NS_PER_S / self._rate_hz
         start_ns = self._clock.now_ns()
         seq = 0
+        before: Pose | None = None
         try:
             while True:
                 early_s = (start_ns + seq * period_ns - self._clock.now_ns()) / NS_PER_S
@@ -97,7 +109,8 @@ class SimCamera:
                     return
                 pose = poses.read()
                 if pose is not None:
-                    image = renderer.render(pose, seq)
+                    image = photographer.take(motion_between(before, pose), seq).image
+                    before = pose
                     image.flags.writeable = False
                     self._mailbox.put(Frame(seq, pose.t_ns, image))
                 seq = max(seq + 1, int((self._clock.now_ns() - start_ns) / period_ns) + 1)

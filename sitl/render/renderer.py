@@ -2,6 +2,8 @@
 
 import functools
 import itertools
+import math
+from collections.abc import Sequence
 
 import numpy as np
 from numba import njit
@@ -19,6 +21,7 @@ from sitl.render.sensor import Optics, Sensor
 from sitl.world.records import World
 
 _REACH = 1.25  # members are drawn this much beyond the image, so that their width cannot be cut off
+_NEAREST_M = 0.3
 
 
 # Painting takes seconds, and all renderers of a process can share the result.
@@ -48,19 +51,22 @@ class Renderer:
     ) -> None:
         self.intrinsics = intrinsics
         self._world = world
-        self._mount = CameraMount() if mount is None else mount
+        self.mount = CameraMount() if mount is None else mount
         self._layers = build_layers(world, wire_at_least_m)
         self._sun_ned = np.array(world.light.direction_ned)
+        self._level = world.light.direct + world.light.sky
         self._lens = lens_vector(intrinsics)
-        self._rays = ray_table(intrinsics)
-        self._ground = GroundView(_ground_of(world), self._rays, intrinsics.fx_px)
-        x, y = self._rays
+        self.rays = ray_table(intrinsics)
+        self._ground = GroundView(_ground_of(world), self.rays, intrinsics.fx_px)
+        x, y = self.rays
         self._view = np.array([x.min(), x.max(), y.min(), y.max()], dtype=np.float64)
         shape = (intrinsics.height_px, intrinsics.width_px)
         self._light = np.empty((*shape, 3), dtype=np.float32)
         self._coverage = np.zeros(shape, dtype=np.float32)
         self._shaded = np.zeros(shape, dtype=np.float32)
-        self.sensor = Sensor(self._rays, Optics() if optics is None else optics, seed)
+        pieces = [np.hstack([c.points_ned_m[:-1], np.diff(c.points_ned_m, axis=0)]) for c in world.conductors]
+        self._wires = np.concatenate([np.empty((0, 6)), *pieces])
+        self.sensor = Sensor(self.rays, Optics() if optics is None else optics, seed)
 
     def render(self, pose: Pose, seq: int, exposure: Exposure = SUNNY) -> NDArray[np.uint8]:
         """The image (height, width, 3) uint8 BGR at a pose; `seq` chooses the noise."""
@@ -68,7 +74,7 @@ class Renderer:
 
     def sun_camera(self, pose: Pose) -> NDArray[np.float64]:
         """Towards the sun, (3,) in the camera frame, as long as its light is bright (Light.direct)."""
-        _, ned_from_camera = camera_pose(pose, self._mount)
+        _, ned_from_camera = camera_pose(pose, self.mount)
         return self._world.light.direct * (self._sun_ned @ ned_from_camera)
 
     def light(self, pose: Pose) -> NDArray[np.float32]:
@@ -76,29 +82,69 @@ class Renderer:
 
         Its unit is a white sheet at a clear noon; a darker hour's light is less.
         """
-        centre, ned_from_camera = camera_pose(pose, self._mount)
-        camera_from_ned = np.ascontiguousarray(ned_from_camera.T)
-        self._ground.draw(self._light, centre, ned_from_camera)
-        for layer in self._layers:
-            n_seen = draw_members(
-                self._coverage,
-                self._shaded,
-                layer.members,
-                layer.is_ribbon,
-                layer.material,
-                self._sun_ned,
-                centre,
-                camera_from_ned,
-                self._lens,
-                _REACH * self._view,
-            )
-            n_seen += draw_discs(self._coverage, self._shaded, layer.discs, centre, camera_from_ned, self._lens)
-            if n_seen:
-                merge_layer(self._light, self._coverage, self._shaded, layer.bgr, layer.is_shadow)
-        level = self._world.light.direct + self._world.light.sky
-        if level != 1.0:
-            self._light *= np.float32(level)
+        self.add_line(self.ground_light(pose), [pose])
         return self._light
+
+    def ground_light(self, pose: Pose) -> NDArray[np.float32]:
+        """What light() gives, of ground and sky alone."""
+        self._ground.draw(self._light, *camera_pose(pose, self.mount))
+        if self._level != 1.0:
+            self._light *= np.float32(self._level)
+        return self._light
+
+    def add_line(
+        self, light: NDArray[np.float32], poses: Sequence[Pose], top_px: int = 0, bottom_px: int | None = None
+    ) -> None:
+        """Draw the power line with its shadows into the rows from `top_px` to below `bottom_px` of `light`.
+
+        With several poses each counts for its share, as a picture does that is taken while the camera moves.
+        """
+        rows = slice(top_px, bottom_px)
+        coverage, shaded = self._coverage[rows], self._shaded[rows]
+        lens, view = self._lens.copy(), self._view.copy()
+        lens[3] -= top_px
+        view[2:] = self.rays[1][rows].min(), self.rays[1][rows].max()
+        reach = view + (_REACH - 1.0) * self._view
+        seen_from = [camera_pose(pose, self.mount) for pose in poses]
+        for layer in self._layers:
+            n_seen = 0
+            for centre, ned_from_camera in seen_from:
+                camera_from_ned = np.ascontiguousarray(ned_from_camera.T)
+                n_seen += draw_members(
+                    coverage,
+                    shaded,
+                    layer.members,
+                    layer.is_ribbon,
+                    layer.material,
+                    self._sun_ned,
+                    centre,
+                    camera_from_ned,
+                    lens,
+                    reach,
+                )
+                n_seen += draw_discs(coverage, shaded, layer.discs, centre, camera_from_ned, lens)
+            if n_seen:
+                if len(seen_from) > 1:
+                    coverage *= np.float32(1.0 / len(seen_from))
+                    shaded *= np.float32(1.0 / len(seen_from))
+                bgr = layer.bgr if layer.is_shadow else self._level * layer.bgr
+                merge_layer(light[rows], coverage, shaded, bgr, layer.is_shadow)
+
+    def nearest_m(self, centre: NDArray[np.float64]) -> float:
+        """How far the nearest wire or the ground below is from a place (3,) NED [m]."""
+        start, along = self._wires[:, :3], self._wires[:, 3:]
+        part = ((centre - start) * along).sum(axis=1) / (along**2).sum(axis=1)
+        gaps_m = np.linalg.norm(start + np.clip(part, 0.0, 1.0)[:, None] * along - centre, axis=1)
+        return float(max(_NEAREST_M, min(gaps_m.min(initial=math.inf), -centre[2])))
+
+    def depth(self, pose: Pose) -> NDArray[np.float32]:
+        """How far the ground is along the camera's axis, (height, width) float32 [m]; infinite where there is sky."""
+        centre, ned_from_camera = camera_pose(pose, self.mount)
+        x, y = self.rays
+        fall = (ned_from_camera[2, 0] * x + ned_from_camera[2, 1] * y + ned_from_camera[2, 2]).astype(np.float32)
+        with np.errstate(divide="ignore"):
+            depth_m = np.float32(max(0.01, -centre[2])) / fall
+        return np.where(fall > 0.0, depth_m, np.float32(np.inf))
 
     def project(self, pose: Pose) -> list[NDArray[np.float64]]:
         """Where the conductors truly are in the image at a pose.
@@ -106,7 +152,7 @@ class Renderer:
         Returns for each conductor its visible part as (n, 4) float64 [px]: x1, y1, x2, y2 of straight pieces in the
         conductor's order, the centre of the first pixel at (0, 0); none of them where it is out of view.
         """
-        centre, ned_from_camera = camera_pose(pose, self._mount)
+        centre, ned_from_camera = camera_pose(pose, self.mount)
         pieces = []
         for conductor in self._world.conductors:
             points = (conductor.points_ned_m - centre) @ ned_from_camera

@@ -1,0 +1,108 @@
+"""Takes pictures of a world as a camera on a flying vehicle does: exposed by its automatic, smeared by its motion."""
+
+import itertools
+import math
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from sitl.render.exposure import AutoExposure, Exposure, ExposureMeter
+from sitl.render.glare import sample
+from sitl.render.lens import camera_pose
+from sitl.render.motion import Motion, Shutter, sub_times_s
+from sitl.render.renderer import Renderer
+from sitl.render.smear import find_flow, smear
+
+_SHARP_PX = 0.3  # a smear shorter than this does not show beside the lens's blur
+_MOST_SUB_POSES = 12
+_MOST_STRIPS = 32
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Shot:
+    """A picture (height, width, 3) uint8 BGR, and how it was exposed."""
+
+    image: NDArray[np.uint8]
+    exposure: Exposure
+
+
+class Photographer:
+    """A camera in a rendered world. What it takes depends on the shots before it only by the exposure's automatic.
+
+    `shutter.exposure_s` fixes the time and leaves the gain to the automatic.
+    """
+
+    def __init__(
+        self, renderer: Renderer, shutter: Shutter | None = None, automatic: AutoExposure | None = None
+    ) -> None:
+        self._renderer = renderer
+        self._shutter = Shutter() if shutter is None else shutter
+        automatic = AutoExposure() if automatic is None else automatic
+        fixed_s = self._shutter.exposure_s
+        if fixed_s is not None:
+            automatic = AutoExposure(
+                automatic.target, fixed_s, fixed_s, automatic.most_gain, automatic.time_constant_s
+            )
+        self._automatic = automatic
+        self._meter = ExposureMeter(automatic)
+
+    def take(self, motion: Motion, seq: int) -> Shot:
+        """The next frame of a flight. The first one is exposed as after a long look; `seq` chooses the noise."""
+        return self._take(motion, seq, self._meter)
+
+    def take_alone(self, motion: Motion, seq: int) -> Shot:
+        """A single picture, exposed as after a long look, whatever was taken before."""
+        return self._take(motion, seq, ExposureMeter(self._automatic))
+
+    def _take(self, motion: Motion, seq: int, meter: ExposureMeter) -> Shot:
+        pose, renderer = motion.pose, self._renderer
+        sun = renderer.sun_camera(pose)
+        if meter.exposure is None:
+            meter.settle(sample(renderer.light(pose)), pose.t_ns)
+        exposure = meter.exposure
+        assert exposure is not None  # noqa: S101  settle() has set it
+        light = self.gather(motion, exposure.time_s)
+        shot = Shot(renderer.sensor.expose(light, exposure, seq, sun), exposure)
+        meter.follow(sample(light), pose.t_ns)
+        return shot
+
+    def gather(self, motion: Motion, exposure_s: float) -> NDArray[np.float32]:
+        """The light (height, width, 3) float32 that falls on the sensor while it moves; a later call may overwrite it.
+
+        The ground is rendered once and smeared, the power line drawn from as many poses as its smear is pixels long:
+        it is nearer, and moves more.
+        """
+        renderer, shutter = self._renderer, self._shutter
+        blur_px = self.smear_px(motion, exposure_s)
+        shear_px = self.smear_px(motion, shutter.readout_s)
+        if max(blur_px, shear_px) < _SHARP_PX:
+            return renderer.light(motion.pose)
+        light = renderer.ground_light(motion.pose)
+        intrinsics = renderer.intrinsics
+        flow = find_flow(
+            motion, shutter, exposure_s, renderer.mount, intrinsics, renderer.rays, renderer.depth(motion.pose)
+        )
+        longest_px = float(np.linalg.norm(flow[1] - flow[0], axis=-1).max())
+        n_samples = min(_MOST_SUB_POSES, max(1, math.ceil(longest_px + 0.5)))
+        gathered = smear(light, flow, n_samples)
+        n_poses = 1 if blur_px < _SHARP_PX else min(_MOST_SUB_POSES, 1 + math.ceil(blur_px))
+        n_strips = min(_MOST_STRIPS, intrinsics.height_px, max(1, math.ceil(3.0 * shear_px)))
+        edges = np.linspace(0, intrinsics.height_px, n_strips + 1).round().astype(int)
+        for top, bottom in itertools.pairwise(edges.tolist()):
+            middle_s = shutter.row_s((top + bottom - 1) / 2.0, intrinsics.height_px)
+            poses = [motion.pose_at(middle_s + dt_s) for dt_s in sub_times_s(exposure_s, n_poses)]
+            renderer.add_line(gathered, poses, top, bottom)
+        return gathered
+
+    def smear_px(self, motion: Motion, duration_s: float) -> float:
+        """At least how far anything in view moves over the picture within a time [px]."""
+        if motion.is_still or duration_s == 0.0:
+            return 0.0
+        renderer = self._renderer
+        x, y = renderer.rays[:, :: max(1, renderer.rays.shape[1] - 1), :: max(1, renderer.rays.shape[2] - 1)]
+        stretch = 1.0 + float((x**2 + y**2).max())  # a turn moves more in the corners than in the middle
+        centre, _ = camera_pose(motion.pose, renderer.mount)
+        by_moving = float(np.linalg.norm(motion.velocity_ned_m_s)) / renderer.nearest_m(centre)
+        by_turning = float(np.linalg.norm(motion.rates_frd_rad_s))
+        return renderer.intrinsics.fx_px * duration_s * math.sqrt(stretch) * (by_moving + math.sqrt(stretch) * by_turning)
