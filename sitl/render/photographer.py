@@ -4,6 +4,7 @@ import itertools
 import math
 from dataclasses import dataclass
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
@@ -16,7 +17,7 @@ from sitl.render.smear import find_flow, smear
 
 _SHARP_PX = 0.3  # a smear shorter than this does not show beside the lens's blur
 _MOST_SUB_POSES = 12
-_MOST_STRIPS = 32
+_MOST_STRIPS = 24
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -70,8 +71,8 @@ class Photographer:
     def gather(self, motion: Motion, exposure_s: float) -> NDArray[np.float32]:
         """The light (height, width, 3) float32 that falls on the sensor while it moves; a later call may overwrite it.
 
-        The ground is rendered once and smeared, the power line drawn from as many poses as its smear is pixels long:
-        it is nearer, and moves more.
+        The ground is rendered once and smeared. The power line, which is nearer and moves more, is drawn over it from as
+        many poses as its smear is pixels long, and strip by strip of rows for a rolling shutter.
         """
         renderer, shutter = self._renderer, self._shutter
         blur_px = self.smear_px(motion, exposure_s)
@@ -85,14 +86,17 @@ class Photographer:
         )
         longest_px = float(np.linalg.norm(flow[1] - flow[0], axis=-1).max())
         n_samples = min(_MOST_SUB_POSES, max(1, math.ceil(longest_px + 0.5)))
-        gathered = smear(light, flow, n_samples)
+        ground = smear(light, flow, n_samples)
         n_poses = 1 if blur_px < _SHARP_PX else min(_MOST_SUB_POSES, 1 + math.ceil(blur_px))
-        n_strips = min(_MOST_STRIPS, intrinsics.height_px, max(1, math.ceil(3.0 * shear_px)))
+        n_strips = min(_MOST_STRIPS, intrinsics.height_px, max(1, math.ceil(2.0 * shear_px)))
         edges = np.linspace(0, intrinsics.height_px, n_strips + 1).round().astype(int)
+        gathered = np.zeros_like(ground)
         for top, bottom in itertools.pairwise(edges.tolist()):
             middle_s = shutter.row_s((top + bottom - 1) / 2.0, intrinsics.height_px)
-            poses = [motion.pose_at(middle_s + dt_s) for dt_s in sub_times_s(exposure_s, n_poses)]
-            renderer.add_line(gathered, poses, top, bottom)
+            for dt_s in sub_times_s(exposure_s, n_poses):
+                np.copyto(light, ground)
+                renderer.add_line(light, motion.pose_at(middle_s + dt_s))
+                cv2.scaleAdd(light[top:bottom], 1.0 / n_poses, gathered[top:bottom], dst=gathered[top:bottom])
         return gathered
 
     def smear_px(self, motion: Motion, duration_s: float) -> float:

@@ -3,7 +3,6 @@
 import functools
 import itertools
 import math
-from collections.abc import Sequence
 
 import numpy as np
 from numba import njit
@@ -82,53 +81,38 @@ class Renderer:
 
         Its unit is a white sheet at a clear noon; a darker hour's light is less.
         """
-        self.add_line(self.ground_light(pose), [pose])
+        self.ground_light(pose)
+        self.add_line(self._light, pose)
         return self._light
 
     def ground_light(self, pose: Pose) -> NDArray[np.float32]:
-        """What light() gives, of ground and sky alone."""
+        """What light() gives, without the power line; the next call of either overwrites it."""
         self._ground.draw(self._light, *camera_pose(pose, self.mount))
         if self._level != 1.0:
             self._light *= np.float32(self._level)
         return self._light
 
-    def add_line(
-        self, light: NDArray[np.float32], poses: Sequence[Pose], top_px: int = 0, bottom_px: int | None = None
-    ) -> None:
-        """Draw the power line with its shadows into the rows from `top_px` to below `bottom_px` of `light`.
-
-        With several poses each counts for its share, as a picture does that is taken while the camera moves.
-        """
-        rows = slice(top_px, bottom_px)
-        coverage, shaded = self._coverage[rows], self._shaded[rows]
-        lens, view = self._lens.copy(), self._view.copy()
-        lens[3] -= top_px
-        view[2:] = self.rays[1][rows].min(), self.rays[1][rows].max()
-        reach = view + (_REACH - 1.0) * self._view
-        seen_from = [camera_pose(pose, self.mount) for pose in poses]
+    def add_line(self, light: NDArray[np.float32], pose: Pose) -> None:
+        """Draw the power line as it is seen from a pose over `light`; the ground under it may be seen from near there."""
+        centre, ned_from_camera = camera_pose(pose, self.mount)
+        camera_from_ned = np.ascontiguousarray(ned_from_camera.T)
         for layer in self._layers:
-            n_seen = 0
-            for centre, ned_from_camera in seen_from:
-                camera_from_ned = np.ascontiguousarray(ned_from_camera.T)
-                n_seen += draw_members(
-                    coverage,
-                    shaded,
-                    layer.members,
-                    layer.is_ribbon,
-                    layer.material,
-                    self._sun_ned,
-                    centre,
-                    camera_from_ned,
-                    lens,
-                    reach,
-                )
-                n_seen += draw_discs(coverage, shaded, layer.discs, centre, camera_from_ned, lens)
+            n_seen = draw_members(
+                self._coverage,
+                self._shaded,
+                layer.members,
+                layer.is_ribbon,
+                layer.material,
+                self._sun_ned,
+                centre,
+                camera_from_ned,
+                self._lens,
+                _REACH * self._view,
+            )
+            n_seen += draw_discs(self._coverage, self._shaded, layer.discs, centre, camera_from_ned, self._lens)
             if n_seen:
-                if len(seen_from) > 1:
-                    coverage *= np.float32(1.0 / len(seen_from))
-                    shaded *= np.float32(1.0 / len(seen_from))
                 bgr = layer.bgr if layer.is_shadow else self._level * layer.bgr
-                merge_layer(light[rows], coverage, shaded, bgr, layer.is_shadow)
+                merge_layer(light, self._coverage, self._shaded, bgr, layer.is_shadow)
 
     def nearest_m(self, centre: NDArray[np.float64]) -> float:
         """How far the nearest wire or the ground below is from a place (3,) NED [m]."""
