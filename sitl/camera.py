@@ -23,9 +23,9 @@ class SimCamera:
 
     `world` names the world (sitl.world.load_world), `pose_block` the shared memory that the vehicle writes its pose to.
     Frames come at `rate_hz` of the clock's flight time, as far as the rendering keeps up; those it misses
-    count in `seq`. `seed` is that of the sensor's noise; `shutter` says how the frames are exposed while the vehicle moves,
-    whose motion is that from one frame's pose to the next one's. Entering it paints the world and compiles, which takes
-    seconds, and raises CameraError when the world or the pose block is not there.
+    count in `seq`. `seed` is that of the sensor's noise; `shutter` says how the frames are exposed while the vehicle
+    moves; its motion is that from one frame's pose to the next one's. Entering it paints the world and compiles, which
+    takes seconds, and raises CameraError when the world or the pose block is not there.
     """
 
     def __init__(
@@ -77,7 +77,9 @@ class SimCamera:
         self._compile(renderer)
         self._mailbox = Mailbox()
         self._stop.clear()
-        self._thread = threading.Thread(target=self._grab, args=(Photographer(renderer, self._shutter), poses), name="sim-camera", daemon=True)
+        self._thread = threading.Thread(
+            target=self._grab, args=(Photographer(renderer, self._shutter), poses), name="sim-camera", daemon=True
+        )
         self._thread.start()
         return self
 

@@ -129,7 +129,9 @@ class _Entry:
 
 def _take_all(settings: DatasetSettings, on_picture: Callable[[], None]) -> list[_Entry]:
     # Pictures of the same light and camera stand together: each pair needs its own renderer, which takes seconds.
-    order = sorted(range(settings.n), key=lambda index: (_choose(settings, index)[1] or "", _choose(settings, index)[0]))
+    order = sorted(
+        range(settings.n), key=lambda index: (_choose(settings, index)[1] or "", _choose(settings, index)[0])
+    )
     chunks = [order[first : first + _CHUNK] for first in range(0, settings.n, _CHUNK)]
     entries: dict[int, _Entry] = {}
     n_workers = max(1, min(len(chunks), len(os.sched_getaffinity(0))))

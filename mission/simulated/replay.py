@@ -26,7 +26,7 @@ from sitl.render.photographer import Photographer
 from sitl.render.renderer import Renderer
 from sitl.render.truth.sampling import CameraName
 from sitl.world.file import load_world
-from sitl.world.light import LightName
+from sitl.world.light import LIGHT_NAMES, LightName
 from sitl.world.records import World
 
 RATE_HZ = 25.0
@@ -42,7 +42,7 @@ _MARGIN_PX = 10
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Track:
-    """Where the vehicle was: times (n,) [s] from the first, and (n, 6) north, east, down [m], roll, pitch, yaw [rad]."""
+    """Where the vehicle was: times (n,) [s] from the first on; (n, 6) north, east, down [m], roll, pitch, yaw [rad]."""
 
     start_ns: int
     times_s: NDArray[np.float64]
@@ -77,12 +77,19 @@ def track_of(flight: Flight) -> Track:
 
 
 def world_of(flight: Flight, world: str | None, light: LightName | None) -> World:
-    """The world that a log names, or the given one. Raises PicturesError, and WorldError for one that cannot be read."""
-    name = world or flight.mission.metadata.get("world")
+    """The world that a log names, or the given one. Raises PicturesError, and WorldError where it cannot be read."""
+    told = flight.mission.metadata
+    name = world or told.get("world")
+    if name is None and told.get("camera", "").startswith("sim:"):
+        name = told["camera"].removeprefix("sim:")
     if name is None:
         raise PicturesError(f"The log {flight.path} names no world: it was not flown in a simulated one; give --world.")
-    said = flight.mission.metadata.get("light")
-    return load_world(name, light or said)  # type: ignore[arg-type]  # what a log says was a light's name
+    lights: dict[str, LightName] = {known: known for known in LIGHT_NAMES}
+    if light is None and "light" in told:
+        light = lights.get(told["light"])
+        if light is None:
+            raise PicturesError(f"The log {flight.path} tells of the light '{told['light']}'; choose one with --light.")
+    return load_world(name, light)
 
 
 def write_video(
@@ -114,7 +121,9 @@ def write_video(
     video = cv2.VideoWriter(str(out), cv2.VideoWriter.fourcc(*"mp4v"), RATE_HZ, (width_px, height_px + _BAR_PX))
     try:
         if not video.isOpened():
-            raise PicturesError(f"The video {out} cannot be written; name a .mp4 file in a folder that you may write to.")
+            raise PicturesError(
+                f"The video {out} cannot be written; name a .mp4 file in a folder that you may write to."
+            )
         for k, frame in enumerate(_frames(track, views, overlay, n_frames)):
             video.write(frame)
             on_frame(k + 1, n_frames)
@@ -182,7 +191,9 @@ class _Overlay:
         # Reports are in the pixels of the flight's camera.
         scale = np.tile([image.shape[1] / self._camera.width_px, image.shape[0] / self._camera.height_px], 2)
         for x1, y1, x2, y2 in (self._reports[nearest].power_lines + 0.5) * scale - 0.5:
-            cv2.line(image, (round(x1 * 8), round(y1 * 8)), (round(x2 * 8), round(y2 * 8)), _LINE_BGR, 2, cv2.LINE_AA, 3)
+            cv2.line(
+                image, (round(x1 * 8), round(y1 * 8)), (round(x2 * 8), round(y2 * 8)), _LINE_BGR, 2, cv2.LINE_AA, 3
+            )
 
     def finish(self, image: NDArray[np.uint8], pose: Pose, t_s: float) -> NDArray[np.uint8]:
         """The whole frame; the next call draws over it."""

@@ -1,4 +1,4 @@
-"""`lineflight world render | dataset | replay`: pictures of simulated worlds, with their truth, and videos of flights."""
+"""`lineflight world render | dataset | replay`: pictures of simulated worlds with their truth, videos of flights."""
 
 import math
 import sys
@@ -125,7 +125,7 @@ def replay(
         from rich.console import Console
         from rich.progress import Progress
 
-        from mission.simulated.replay import write_video, world_of
+        from mission.simulated.replay import world_of, write_video
 
         scene = world_of(flight, world, light)
         with Progress(console=Console(stderr=True), transient=True, disable=not sys.stderr.isatty()) as progress:

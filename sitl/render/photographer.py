@@ -42,9 +42,7 @@ class Photographer:
         automatic = AutoExposure() if automatic is None else automatic
         fixed_s = self._shutter.exposure_s
         if fixed_s is not None:
-            automatic = AutoExposure(
-                automatic.target, fixed_s, fixed_s, automatic.most_gain, automatic.time_constant_s
-            )
+            automatic = AutoExposure(automatic.target, fixed_s, fixed_s, automatic.most_gain, automatic.time_constant_s)
         self._automatic = automatic
         self._meter = ExposureMeter(automatic)
 
@@ -71,8 +69,8 @@ class Photographer:
     def gather(self, motion: Motion, exposure_s: float) -> NDArray[np.float32]:
         """The light (height, width, 3) float32 that falls on the sensor while it moves; a later call may overwrite it.
 
-        The ground is rendered once and smeared. The power line, which is nearer and moves more, is drawn over it from as
-        many poses as its smear is pixels long, and strip by strip of rows for a rolling shutter.
+        The ground is rendered once and smeared. The power line, which is nearer and moves more, is drawn over it from
+        as many poses as its smear is pixels long, and strip by strip of rows for a rolling shutter.
         """
         renderer, shutter = self._renderer, self._shutter
         blur_px = self.smear_px(motion, exposure_s)
@@ -109,4 +107,6 @@ class Photographer:
         centre, _ = camera_pose(motion.pose, renderer.mount)
         by_moving = float(np.linalg.norm(motion.velocity_ned_m_s)) / renderer.nearest_m(centre)
         by_turning = float(np.linalg.norm(motion.rates_frd_rad_s))
-        return renderer.intrinsics.fx_px * duration_s * math.sqrt(stretch) * (by_moving + math.sqrt(stretch) * by_turning)
+        return (
+            renderer.intrinsics.fx_px * duration_s * math.sqrt(stretch) * (by_moving + math.sqrt(stretch) * by_turning)
+        )

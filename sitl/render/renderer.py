@@ -93,7 +93,7 @@ class Renderer:
         return self._light
 
     def add_line(self, light: NDArray[np.float32], pose: Pose) -> None:
-        """Draw the power line as it is seen from a pose over `light`; the ground under it may be seen from near there."""
+        """Draw the power line as a pose sees it over `light`, the ground as it is seen from there or near there."""
         centre, ned_from_camera = camera_pose(pose, self.mount)
         camera_from_ned = np.ascontiguousarray(ned_from_camera.T)
         for layer in self._layers:

@@ -107,4 +107,5 @@ def smear(light: NDArray[np.float32], flow: NDArray[np.float32], n_samples: int)
         spread_flow(flow, 0.5 + part, rows, columns, map_x, map_y)
         seen = cv2.remap(light, map_x, map_y, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REPLICATE)
         cv2.accumulate(seen, gathered)
-    return np.asarray(cv2.multiply(gathered, (1.0 / n_samples,) * 4, dst=gathered), dtype=np.float32)
+    gathered *= np.float32(1.0 / n_samples)
+    return gathered

@@ -109,7 +109,8 @@ def mark_strips(
             half = max(_AT_LEAST_PX, 0.5 * (w0 + part * (w1 - w0)) / steep)
             z = 1.0 / (1.0 / z0 + part * (1.0 / z1 - 1.0 / z0))
             for j in range(
-                max(0, math.ceil(middle - half)), min((height_px if is_flat else width_px) - 1, math.floor(middle + half)) + 1
+                max(0, math.ceil(middle - half)),
+                min((height_px if is_flat else width_px) - 1, math.floor(middle + half)) + 1,
             ):
                 u, v = (i, j) if is_flat else (j, i)
                 # Some leeway, for a depth in which the member itself is drawn already.

@@ -51,8 +51,11 @@ class Box:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class TrueLine:
-    """A conductor in the picture: (n, 5) float64: x1, y1, x2, y2 [px] of straight pieces as Renderer.project gives them,
-    and the part of each that is visible, 0 to 1."""
+    """A conductor in the picture.
+
+    `pieces` is (n, 5) float64: x1, y1, x2, y2 [px] of straight pieces as Renderer.project gives them, and the part of
+    each that is visible, 0 to 1.
+    """
 
     thing: int
     is_shield: bool

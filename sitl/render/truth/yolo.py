@@ -27,7 +27,7 @@ def yolo_boxes(truth: Truth) -> str:
 
 
 def yolo_polygons(truth: Truth) -> str:
-    """A line "class x1 y1 x2 y2 ..." for each visible run of each wire: the strip that it covers, a pixel wide at least."""
+    """A line "class x1 y1 x2 y2 ..." for each visible run of each wire: the strip it covers, at least a pixel wide."""
     height_px, width_px = truth.mask.shape
     lines = []
     for box in truth.boxes:

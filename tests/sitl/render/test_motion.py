@@ -1,4 +1,4 @@
-"""Motion smears and shears what the camera sees by as much as geometry says, and the fast way shows what the slow one does."""
+"""Motion smears and shears what the camera sees by as much as geometry says; the fast way shows what the slow does."""
 
 import dataclasses
 import math
@@ -59,7 +59,7 @@ def width_px(profile: NDArray[np.float64]) -> float:
 @pytest.mark.parametrize("depth_m", [6.0, 16.0])
 @pytest.mark.parametrize("is_fast", [True, False])
 def test_a_wire_is_smeared_by_its_own_depth(depth_m: float, is_fast: bool) -> None:
-    """f v t / z: nearer things smear more. The wire 16 m below lies where the ground would."""
+    """Nearer things smear more, by f v t / z. The wire 16 m below lies where the ground would."""
     height_m = 16.5
     renderer = OverBlack(bare_world(wire_along_east(height_m - depth_m)), CAMERA)
     squares = []
@@ -73,7 +73,9 @@ def test_a_wire_is_smeared_by_its_own_depth(depth_m: float, is_fast: bool) -> No
         squares.append(width_px(light[:, 150:170].mean(axis=(1, 2))) ** 2)
     still_px = CAMERA.fy_px * 0.03 / depth_m
     expected_px = CAMERA.fy_px * SPEED_M_S * EXPOSURE_S / depth_m
-    assert math.sqrt(np.mean(squares)) == pytest.approx(math.hypot(expected_px, still_px, 1.0), rel=0.05)  # 1 px: a pixel's own width
+    assert math.sqrt(np.mean(squares)) == pytest.approx(
+        math.hypot(expected_px, still_px, 1.0), rel=0.05
+    )  # 1 px: a pixel's own width
 
 
 def test_the_ground_is_smeared_by_its_depth() -> None:
@@ -174,9 +176,8 @@ def test_an_impossible_shutter_is_refused(arguments: tuple[float | None, float])
 def test_compiled_smearing_equals_plain_python() -> None:
     camera = pinhole(40, 30, 1.3)
     motion = Motion(Pose(0, 0.0, 0.0, -5.0, quaternion_of(0.1, 0.2, 0.3)), (6.0, -3.0, 1.0), (1.0, 0.5, -2.0))
-    flow = find_flow(
-        motion, Shutter(readout_s=0.02), 0.02, CameraMount(), camera, ray_table(camera), np.full((30, 40), 5.0, np.float32)
-    )  # fmt: skip
+    depth_m = np.full((30, 40), 5.0, dtype=np.float32)
+    flow = find_flow(motion, Shutter(readout_s=0.02), 0.02, CameraMount(), camera, ray_table(camera), depth_m)
     assert np.abs(flow).max() > 1.0
     results = []
     for kernel in (spread_flow, spread_flow.py_func):

@@ -124,11 +124,12 @@ def test_a_fixed_time_leaves_the_gain_to_the_automatic() -> None:
 
 
 @pytest.mark.parametrize(
-    "arguments", [{"target": 0.0}, {"shortest_s": 0.0}, {"shortest_s": 0.01}, {"most_gain": 0.5}, {"time_constant_s": 0.0}]
-)  # fmt: skip
-def test_an_impossible_automatic_is_refused(arguments: dict[str, float]) -> None:
+    ("name", "value"),
+    [("target", 0.0), ("shortest_s", 0.0), ("shortest_s", 0.01), ("most_gain", 0.5), ("time_constant_s", 0.0)],
+)
+def test_an_impossible_automatic_is_refused(name: str, value: float) -> None:
     with pytest.raises(ValueError, match="automatic"):
-        AutoExposure(**arguments)
+        AutoExposure(**{name: value})
 
 
 def sun_at(x: float, y: float, bright: float) -> NDArray[np.float64]:

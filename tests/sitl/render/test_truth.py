@@ -30,9 +30,7 @@ OVER_A_POLE = Pose(0, 14.0, -3.5, -14.0, quaternion_of(0.05, -0.1, math.radians(
 
 def world_of(wires: tuple[Conductor, ...], supports: tuple[Support, ...] = ()) -> World:
     world = load_world()
-    return dataclasses.replace(
-        world, lines=(dataclasses.replace(world.line, supports=supports, conductors=wires),)
-    )
+    return dataclasses.replace(world, lines=(dataclasses.replace(world.line, supports=supports, conductors=wires),))
 
 
 def wire(east_m: float, height_m: float, diameter_m: float = 0.01, *, is_shield: bool = False) -> Conductor:
