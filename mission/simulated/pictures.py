@@ -75,7 +75,7 @@ def render_picture(
     renderer = Renderer(scene, intrinsics, MOUNTS[camera])
     pose = Pose(0, north_m, east_m, down_m, quaternion_of(roll_rad, pitch_rad, yaw_rad))
     shot = Photographer(renderer).take_alone(Motion(pose), 0)
-    return shot.image, TruthFinder(scene, renderer).find(pose)
+    return shot.image, TruthFinder(renderer).find(pose)
 
 
 def write_picture_files(out: Path, image: NDArray[np.uint8], truth: Truth | None) -> list[Path]:
@@ -170,12 +170,13 @@ class _Worker:
         if key != self._key:
             camera, light = self._key = key
             self._world: World = load_world(settings.world, light)
+            self._surface = surface_of(self._world)
             intrinsics = pinhole(settings.width_px, settings.height_px, settings.hfov_rad)
             renderer = Renderer(self._world, intrinsics, MOUNTS[camera], seed=settings.seed)
             self._photographer = Photographer(renderer)
-            self._truth = TruthFinder(self._world, renderer)
+            self._truth = TruthFinder(renderer)
         camera, light = key
-        view = sample_view(self._world, camera, np.random.default_rng((settings.seed, index)))
+        view = sample_view(self._world, self._surface, camera, np.random.default_rng((settings.seed, index)))
         shot = self._photographer.take_alone(view.motion, index)
         truth = self._truth.find(view.motion.pose)
         name = f"{index:06d}"

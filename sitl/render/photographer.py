@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
+from numba import njit
 from numpy.typing import NDArray
 
 from sitl.render.exposure import AutoExposure, Exposure, ExposureMeter
@@ -13,9 +14,11 @@ from sitl.render.glare import sample
 from sitl.render.lens import camera_pose
 from sitl.render.motion import Motion, Shutter, sub_times_s
 from sitl.render.renderer import Renderer
-from sitl.render.smear import find_flow, smear
+from sitl.render.smear import find_flow, grid_places, smear
+from sitl.world.surface import surface_of
 
 _SHARP_PX = 0.3  # a smear shorter than this does not show beside the lens's blur
+_NEAREST_M = 0.3
 _MOST_SUB_POSES = 12
 _MOST_STRIPS = 24
 
@@ -45,6 +48,9 @@ class Photographer:
             automatic = AutoExposure(automatic.target, fixed_s, fixed_s, automatic.most_gain, automatic.time_constant_s)
         self._automatic = automatic
         self._meter = ExposureMeter(automatic)
+        self._surface = surface_of(renderer.world)
+        wires = [np.hstack([wire.points_ned_m[:-1], wire.points_ned_m[1:]]) for wire in renderer.world.conductors]
+        self._wires = np.concatenate([np.empty((0, 6)), *wires])
 
     def take(self, motion: Motion, seq: int) -> Shot:
         """The next frame of a flight. The first one is exposed as after a long look; `seq` chooses the noise."""
@@ -79,9 +85,9 @@ class Photographer:
             return renderer.light(motion.pose)
         light = renderer.ground_light(motion.pose)
         intrinsics = renderer.intrinsics
-        flow = find_flow(
-            motion, shutter, exposure_s, renderer.mount, intrinsics, renderer.rays, renderer.depth(motion.pose)
-        )
+        places = grid_places(intrinsics.height_px), grid_places(intrinsics.width_px)
+        depth_m = renderer.ground_depth_at(*places)
+        flow = find_flow(motion, shutter, exposure_s, renderer.mount, intrinsics, renderer.rays, depth_m)
         longest_px = float(np.linalg.norm(flow[1] - flow[0], axis=-1).max())
         n_samples = min(_MOST_SUB_POSES, max(1, math.ceil(longest_px + 0.5)))
         ground = smear(light, flow, n_samples)
@@ -105,8 +111,28 @@ class Photographer:
         x, y = renderer.rays[:, :: max(1, renderer.rays.shape[1] - 1), :: max(1, renderer.rays.shape[2] - 1)]
         stretch = 1.0 + float((x**2 + y**2).max())  # a turn moves more in the corners than in the middle
         centre, _ = camera_pose(motion.pose, renderer.mount)
-        by_moving = float(np.linalg.norm(motion.velocity_ned_m_s)) / renderer.nearest_m(centre)
+        over_ground_m = -float(centre[2]) - self._surface.at(float(centre[0]), float(centre[1]))
+        nearest_m = max(_NEAREST_M, min(over_ground_m, nearest_wire_m(self._wires, centre)))
+        by_moving = float(np.linalg.norm(motion.velocity_ned_m_s)) / nearest_m
         by_turning = float(np.linalg.norm(motion.rates_frd_rad_s))
         return (
             renderer.intrinsics.fx_px * duration_s * math.sqrt(stretch) * (by_moving + math.sqrt(stretch) * by_turning)
         )
+
+
+@njit(nogil=True, cache=True)  # type: ignore[untyped-decorator]
+def nearest_wire_m(wires: NDArray[np.float64], place: NDArray[np.float64]) -> float:
+    """How far the nearest of straight pieces (n, 6), both ends NED [m], is from a place (3,); infinite without any."""
+    nearest = np.inf
+    for k in range(len(wires)):
+        along, length2 = 0.0, 0.0
+        for i in range(3):
+            step = wires[k, 3 + i] - wires[k, i]
+            along += step * (place[i] - wires[k, i])
+            length2 += step * step
+        part = min(1.0, max(0.0, along / max(1e-12, length2)))
+        gap = 0.0
+        for i in range(3):
+            gap += (wires[k, i] + part * (wires[k, 3 + i] - wires[k, i]) - place[i]) ** 2
+        nearest = min(nearest, gap)
+    return math.sqrt(nearest)

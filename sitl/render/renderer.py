@@ -2,7 +2,6 @@
 
 import functools
 import itertools
-import math
 
 import numpy as np
 from numba import njit
@@ -20,7 +19,6 @@ from sitl.render.sensor import Optics, Sensor
 from sitl.world.records import World
 
 _REACH = 1.25  # members are drawn this much beyond the image, so that their width cannot be cut off
-_NEAREST_M = 0.3
 
 
 # Painting takes seconds, and all renderers of a process can share the result.
@@ -49,7 +47,7 @@ class Renderer:
         wire_at_least_m: float = 0.0,
     ) -> None:
         self.intrinsics = intrinsics
-        self._world = world
+        self.world = world
         self.mount = CameraMount() if mount is None else mount
         self._layers = build_layers(world, wire_at_least_m)
         self._sun_ned = np.array(world.light.direction_ned)
@@ -63,8 +61,7 @@ class Renderer:
         self._light = np.empty((*shape, 3), dtype=np.float32)
         self._coverage = np.zeros(shape, dtype=np.float32)
         self._shaded = np.zeros(shape, dtype=np.float32)
-        pieces = [np.hstack([c.points_ned_m[:-1], np.diff(c.points_ned_m, axis=0)]) for c in world.conductors]
-        self._wires = np.concatenate([np.empty((0, 6)), *pieces])
+        self._looked_from = Pose(0, 0.0, 0.0, 0.0, (1.0, 0.0, 0.0, 0.0))
         self.sensor = Sensor(self.rays, Optics() if optics is None else optics, seed)
 
     def render(self, pose: Pose, seq: int, exposure: Exposure = SUNNY) -> NDArray[np.uint8]:
@@ -74,7 +71,7 @@ class Renderer:
     def sun_camera(self, pose: Pose) -> NDArray[np.float64]:
         """Towards the sun, (3,) in the camera frame, as long as its light is bright (Light.direct)."""
         _, ned_from_camera = camera_pose(pose, self.mount)
-        return self._world.light.direct * (self._sun_ned @ ned_from_camera)
+        return self.world.light.direct * (self._sun_ned @ ned_from_camera)
 
     def light(self, pose: Pose) -> NDArray[np.float32]:
         """The light (height, width, 3) float32 linear BGR that comes to the camera; the next call overwrites it.
@@ -87,6 +84,7 @@ class Renderer:
 
     def ground_light(self, pose: Pose) -> NDArray[np.float32]:
         """What light() gives, without the power line; the next call of either overwrites it."""
+        self._looked_from = pose
         self._ground.draw(self._light, *camera_pose(pose, self.mount))
         if self._level != 1.0:
             self._light *= np.float32(self._level)
@@ -114,12 +112,9 @@ class Renderer:
                 bgr = layer.bgr if layer.is_shadow else self._level * layer.bgr
                 merge_layer(light, self._coverage, self._shaded, bgr, layer.is_shadow)
 
-    def nearest_m(self, centre: NDArray[np.float64]) -> float:
-        """How far the nearest wire or the ground below is from a place (3,) NED [m]."""
-        start, along = self._wires[:, :3], self._wires[:, 3:]
-        part = ((centre - start) * along).sum(axis=1) / (along**2).sum(axis=1)
-        gaps_m = np.linalg.norm(start + np.clip(part, 0.0, 1.0)[:, None] * along - centre, axis=1)
-        return float(max(_NEAREST_M, min(gaps_m.min(initial=math.inf), -centre[2])))
+    def ground_depth_at(self, rows: NDArray[np.int64], columns: NDArray[np.int64]) -> NDArray[np.float32]:
+        """How far the ground is that was looked at last, at those rows and columns: (rows, columns) float32 [m]."""
+        return self.depth(self._looked_from)[np.ix_(rows, columns)]
 
     def depth(self, pose: Pose) -> NDArray[np.float32]:
         """How far the ground is along the camera's axis, (height, width) float32 [m]; infinite where there is sky."""
@@ -138,7 +133,7 @@ class Renderer:
         """
         centre, ned_from_camera = camera_pose(pose, self.mount)
         pieces = []
-        for conductor in self._world.conductors:
+        for conductor in self.world.conductors:
             points = (conductor.points_ned_m - centre) @ ned_from_camera
             rows = []
             for p, q in itertools.pairwise(points):

@@ -30,11 +30,11 @@ def find_flow(
 ) -> NDArray[np.float32]:
     """Where in the picture of `motion.pose` stands what each pixel sees at its exposure's start and end.
 
-    `rays` is lens.ray_table's and `depth_m` (height, width) Renderer.depth's at `motion.pose`. Returns (2, rows,
-    columns, 2) float32 [px]: start and end, at grid_places(), x and y as a shift from the pixel itself.
+    `rays` is lens.ray_table's and `depth_m` (rows, columns) the ground's [m] at grid_places(), seen from `motion.pose`.
+    Returns (2, rows, columns, 2) float32 [px]: start and end, there, x and y as a shift from the pixel itself.
     """
     rows, columns = grid_places(intrinsics.height_px), grid_places(intrinsics.width_px)
-    z = np.minimum(depth_m[np.ix_(rows, columns)], _FAR_M).astype(np.float64)
+    z = np.minimum(depth_m, _FAR_M).astype(np.float64)
     x, y = rays[:, rows[:, None], columns[None, :]].astype(np.float64)
     points = np.stack([x * z, y * z, z], axis=-1)
     centre, ned_from_camera = camera_pose(motion.pose, mount)
@@ -87,12 +87,14 @@ def spread_flow(
                     below = flow[0, i + 1, j, axis] + late * (flow[1, i + 1, j, axis] - flow[0, i + 1, j, axis])
                     upper[j, axis] = above + fv * (below - above)
             for j in range(len(columns) - 1):
-                step = np.float32(1.0 / (columns[j + 1] - columns[j]))
-                dx, dy = step * (upper[j + 1, 0] - upper[j, 0]), step * (upper[j + 1, 1] - upper[j, 1])
-                for u in range(columns[j], columns[j + 1] + 1):
-                    along = np.float32(u - columns[j])
-                    map_x[v, u] = np.float32(u) + upper[j, 0] + along * dx
-                    map_y[v, u] = np.float32(v) + upper[j, 1] + along * dy
+                first, n = columns[j], columns[j + 1] - columns[j] + 1
+                step = np.float32(1.0 / (n - 1))
+                x, dx = np.float32(first) + upper[j, 0], np.float32(1.0) + step * (upper[j + 1, 0] - upper[j, 0])
+                y, dy = np.float32(v) + upper[j, 1], step * (upper[j + 1, 1] - upper[j, 1])
+                row_x, row_y = map_x[v, first : first + n], map_y[v, first : first + n]
+                for k in range(n):
+                    row_x[k] = x + np.float32(k) * dx
+                    row_y[k] = y + np.float32(k) * dy
 
 
 def smear(light: NDArray[np.float32], flow: NDArray[np.float32], n_samples: int) -> NDArray[np.float32]:

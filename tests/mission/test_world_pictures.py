@@ -23,6 +23,7 @@ from sitl.render.lens import ned_from_body, pinhole
 from sitl.render.truth.files import FARTHEST_M, depth_millimetres
 from sitl.render.truth.sampling import sample_view
 from sitl.world.file import WorldError, load_world
+from sitl.world.surface import surface_of
 from vision.records import Track, VisionReport
 
 S_NS = 1_000_000_000
@@ -143,13 +144,13 @@ def test_views_are_over_the_line_and_upright() -> None:
     world = load_world()
     axis = np.array(world.line.axis_ne_m)
     for index in range(200):
-        view = sample_view(world, "down", np.random.default_rng((1, index)))
+        view = sample_view(world, surface_of(world), "down", np.random.default_rng((1, index)))
         pose = view.motion.pose
         assert 4.0 <= -pose.down_m - 7.0 <= 20.0
         assert np.hypot(*(axis - [pose.north_m, pose.east_m]).T).min() < 45.0 + 20.0
         assert ned_from_body(pose)[2, 2] > math.cos(math.radians(30.0))
         assert np.linalg.norm(view.motion.velocity_ned_m_s) < 9.0
-        assert view == sample_view(world, "down", np.random.default_rng((1, index)))
+        assert view == sample_view(world, surface_of(world), "down", np.random.default_rng((1, index)))
 
 
 def test_a_depth_file_is_in_millimetres_and_0_where_it_cannot_tell() -> None:

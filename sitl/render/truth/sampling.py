@@ -9,8 +9,8 @@ import numpy as np
 from sitl.control import quaternion_of
 from sitl.pose import Pose
 from sitl.render.motion import Motion
+from sitl.world.height_grid import HeightGrid
 from sitl.world.records import World
-from sitl.world.surface import surface_of
 
 CameraName = Literal["down", "front"]
 
@@ -33,13 +33,16 @@ class View:
     yaw_rad: float
 
 
-def sample_view(world: World, camera: CameraName, rng: np.random.Generator) -> View:
-    """A view over the world's line: 4 to 15 m above its wires, along it one way or the other, tilted as in flight."""
+def sample_view(world: World, surface: HeightGrid, camera: CameraName, rng: np.random.Generator) -> View:
+    """A view over the world's line: 4 to 15 m above its wires, along it one way or the other, tilted as in flight.
+
+    `surface` is surface_of(world).
+    """
     north_m, east_m, heading_rad = _place_on(world, rng)
     beside_m = rng.normal(0.0, _BESIDE_M[camera])
     north_m -= beside_m * math.sin(heading_rad)
     east_m += beside_m * math.cos(heading_rad)
-    over_all_m = surface_of(world).at(north_m, east_m) + _ABOVE_ALL_M
+    over_all_m = surface.at(north_m, east_m) + _ABOVE_ALL_M
     height_m = max(_wires_up_m(world, north_m, east_m) + rng.uniform(*_ABOVE_WIRES_M), over_all_m)
     course_rad = heading_rad + (math.pi if rng.random() < 0.5 else 0.0)
     yaw_rad = math.remainder(course_rad + rng.normal(0.0, _YAW_RAD[camera]), 2.0 * math.pi)

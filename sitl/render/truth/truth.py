@@ -82,8 +82,8 @@ class Truth:
 class TruthFinder:
     """Finds the truth of what one renderer renders."""
 
-    def __init__(self, world: World, renderer: Renderer) -> None:
-        self._world = world
+    def __init__(self, renderer: Renderer) -> None:
+        self._world = world = renderer.world
         self._renderer = renderer
         self._lens = lens_vector(renderer.intrinsics)
         x, y = renderer.rays

@@ -14,7 +14,7 @@ from sitl.control import quaternion_of
 from sitl.pose import Pose
 from sitl.render.lens import CameraMount, pinhole, ray_table
 from sitl.render.motion import Motion, Shutter, light_by_sub_frames, motion_between
-from sitl.render.photographer import Photographer
+from sitl.render.photographer import Photographer, nearest_wire_m
 from sitl.render.renderer import Renderer
 from sitl.render.smear import find_flow, grid_places, spread_flow
 from sitl.world.file import load_world
@@ -176,7 +176,7 @@ def test_an_impossible_shutter_is_refused(arguments: tuple[float | None, float])
 def test_compiled_smearing_equals_plain_python() -> None:
     camera = pinhole(40, 30, 1.3)
     motion = Motion(Pose(0, 0.0, 0.0, -5.0, quaternion_of(0.1, 0.2, 0.3)), (6.0, -3.0, 1.0), (1.0, 0.5, -2.0))
-    depth_m = np.full((30, 40), 5.0, dtype=np.float32)
+    depth_m = np.full((len(grid_places(30)), len(grid_places(40))), 5.0, dtype=np.float32)
     flow = find_flow(motion, Shutter(readout_s=0.02), 0.02, CameraMount(), camera, ray_table(camera), depth_m)
     assert np.abs(flow).max() > 1.0
     results = []
@@ -186,3 +186,13 @@ def test_compiled_smearing_equals_plain_python() -> None:
         results.append(maps)
     assert np.isfinite(results[0]).all()
     np.testing.assert_allclose(results[0], results[1], atol=1e-4)
+
+
+def test_the_nearest_wire_is_found_between_its_points_too() -> None:
+    rng = np.random.default_rng(2)
+    wires, place = rng.normal(0.0, 5.0, (7, 6)), np.array([1.0, -2.0, 0.5])
+    parts = np.linspace(0.0, 1.0, 4001)[:, None]
+    sampled = min(float(np.linalg.norm(w[:3] + parts * (w[3:] - w[:3]) - place, axis=1).min()) for w in wires)
+    assert nearest_wire_m(wires, place) == pytest.approx(sampled, rel=1e-3)
+    assert nearest_wire_m(wires, place) == pytest.approx(nearest_wire_m.py_func(wires, place))
+    assert nearest_wire_m(np.empty((0, 6)), place) == math.inf

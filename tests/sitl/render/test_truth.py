@@ -43,7 +43,7 @@ def pole(north_m: float, east_m: float, height_m: float) -> Support:
 
 
 def truth_of(world: World, pose: Pose, camera: Intrinsics = CAMERA, mount: CameraMount = DOWN) -> Truth:
-    return TruthFinder(world, Renderer(world, camera, mount)).find(pose)
+    return TruthFinder(Renderer(world, camera, mount)).find(pose)
 
 
 @functools.cache
@@ -81,7 +81,7 @@ def test_the_mask_lies_where_the_picture_shows_something(camera: Intrinsics, mou
     renderer = Renderer(scene, camera, mount, FLAWLESS)
     lit = renderer.light(OVER_A_POLE).copy()
     changed = np.abs(lit - Renderer(empty, camera, mount, FLAWLESS).light(OVER_A_POLE)).max(axis=2)
-    truth = TruthFinder(scene, renderer).find(OVER_A_POLE)
+    truth = TruthFinder(renderer).find(OVER_A_POLE)
     near = cv2.dilate((truth.mask > 0).astype(np.uint8), np.ones((3, 3), np.uint8)) > 0
     assert (truth.mask > 0).sum() > 400
     assert np.median(changed[truth.mask > 0]) > 10.0 * np.median(changed[~near])
@@ -121,7 +121,7 @@ def test_what_the_scene_hides_is_not_marked() -> None:
             depth_m[:100] = 3.0
             return depth_m
 
-    truth = TruthFinder(world, BehindAWall(world, CAMERA)).find(LEVEL)
+    truth = TruthFinder(BehindAWall(world, CAMERA)).find(LEVEL)
     assert not truth.mask[:100].any()
     assert truth.mask[100:].any(axis=1).all()
     (line,) = truth.lines
