@@ -204,7 +204,7 @@ class _Overlay:
         task = "" if span is None else words_of(span.task)
         baseline = height_px + _BAR_PX - 10
         canvas.text((12, baseline), task, 15, INK if span is None else task_color(span.task), is_bold=True)
-        told = f"{-pose.down_m:.1f} m     {int(t_s // 60)}:{t_s % 60:04.1f}"
+        told = f"{round(-pose.down_m, 1) + 0.0:.1f} m     {int(t_s // 60)}:{t_s % 60:04.1f}"
         canvas.text((image.shape[1] - 12 - canvas.text_width(told, 15), baseline), told, 15)
         canvas.paste(self._box, self._map, radius_px=6)
         place = self._map_view.to_px(np.array([[pose.north_m, pose.east_m]]), self._box)[0]

@@ -20,6 +20,7 @@ from sitl.world.surface import surface_of
 _SHARP_PX = 0.3  # a smear shorter than this does not show beside the lens's blur
 _NEAREST_M = 0.3
 _MOST_SUB_POSES = 12
+_GROUND_STEP_PX = 1.5
 _MOST_STRIPS = 24
 
 
@@ -89,7 +90,7 @@ class Photographer:
         depth_m = renderer.ground_depth_at(*places)
         flow = find_flow(motion, shutter, exposure_s, renderer.mount, intrinsics, renderer.rays, depth_m)
         longest_px = float(np.linalg.norm(flow[1] - flow[0], axis=-1).max())
-        n_samples = min(_MOST_SUB_POSES, max(1, math.ceil(longest_px + 0.5)))
+        n_samples = min(_MOST_SUB_POSES, max(1, math.ceil(longest_px / _GROUND_STEP_PX + 0.5)))
         ground = smear(light, flow, n_samples)
         n_poses = 1 if blur_px < _SHARP_PX else min(_MOST_SUB_POSES, 1 + math.ceil(blur_px))
         n_strips = min(_MOST_STRIPS, intrinsics.height_px, max(1, math.ceil(2.0 * shear_px)))
