@@ -10,6 +10,7 @@ from sitl.render.projection import NEAR_M, clip_to_view, project_point
 
 _PIECE_PX = 12.0  # as long as a straight piece may be where the lens bends
 _AT_LEAST_PX = 0.5  # half the width of what is marked of a member: the pixels nearest to its axis at least
+_SEEN_PX = 0.05  # what is thinner leaves no trace in a picture
 _LEEWAY = 0.01
 _LEEWAY_M = 0.15
 
@@ -92,11 +93,13 @@ def mark_strips(
     `numbers` (height, width) int32 and `depth_m` (height, width) float32 are written to; `strips` is find_strips()'s,
     `thing` (members,) int32 the number of the thing that a member belongs to. A pixel belongs to a member when its
     centre lies on it, or when no other in its row (or column) is nearer to the member's axis: what is thinner than a
-    pixel is marked all along.
+    pixel is marked all along, but not what is thinner than a twentieth of it.
     """
     height_px, width_px = numbers.shape
     for k in range(len(strips)):
         x0, y0, w0, z0, x1, y1, w1, z1, member = strips[k]
+        if max(w0, w1) < _SEEN_PX:
+            continue
         length_px = math.hypot(x1 - x0, y1 - y0)
         dx, dy = (1.0, 0.0) if length_px < 1e-9 else ((x1 - x0) / length_px, (y1 - y0) / length_px)
         is_flat = abs(dx) >= abs(dy)
