@@ -103,7 +103,7 @@ class SimCamera:
         period_ns = NS_PER_S / self._rate_hz
         start_ns = self._clock.now_ns()
         seq = 0
-        before: Pose | None = None
+        motion: Motion | None = None
         try:
             while True:
                 early_s = (start_ns + seq * period_ns - self._clock.now_ns()) / NS_PER_S
@@ -111,8 +111,9 @@ class SimCamera:
                     return
                 pose = poses.read()
                 if pose is not None:
-                    image = photographer.take(motion_between(before, pose), seq).image
-                    before = pose
+                    if motion is None or pose.t_ns != motion.pose.t_ns:  # the same pose again tells nothing new
+                        motion = motion_between(None if motion is None else motion.pose, pose)
+                    image = photographer.take(motion, seq).image
                     image.flags.writeable = False
                     self._mailbox.put(Frame(seq, pose.t_ns, image))
                 seq = max(seq + 1, int((self._clock.now_ns() - start_ns) / period_ns) + 1)

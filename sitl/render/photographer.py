@@ -70,7 +70,8 @@ class Photographer:
         assert exposure is not None  # noqa: S101  settle() has set it
         light = self.gather(motion, exposure.time_s)
         shot = Shot(renderer.sensor.expose(light, exposure, seq, sun), exposure)
-        meter.follow(sample(light), pose.t_ns)
+        glare = renderer.sensor.glare(light, exposure, sun)
+        meter.follow(sample(light) if glare is None else sample(light) + glare, pose.t_ns)
         return shot
 
     def gather(self, motion: Motion, exposure_s: float) -> NDArray[np.float32]:
@@ -91,7 +92,8 @@ class Photographer:
         flow = find_flow(motion, shutter, exposure_s, renderer.mount, intrinsics, renderer.rays, depth_m)
         longest_px = float(np.linalg.norm(flow[1] - flow[0], axis=-1).max())
         n_samples = min(_MOST_SUB_POSES, max(1, math.ceil(longest_px / _GROUND_STEP_PX + 0.5)))
-        ground = smear(light, flow, n_samples)
+        is_sharp = n_samples == 1 and shutter.readout_s == 0.0
+        ground = light.copy() if is_sharp else smear(light, flow, n_samples)
         n_poses = 1 if blur_px < _SHARP_PX else min(_MOST_SUB_POSES, 1 + math.ceil(blur_px))
         n_strips = min(_MOST_STRIPS, intrinsics.height_px, max(1, math.ceil(2.0 * shear_px)))
         edges = np.linspace(0, intrinsics.height_px, n_strips + 1).round().astype(int)
