@@ -112,15 +112,14 @@ class Photographer:
             return 0.0
         renderer = self._renderer
         x, y = renderer.rays[:, :: max(1, renderer.rays.shape[1] - 1), :: max(1, renderer.rays.shape[2] - 1)]
-        stretch = 1.0 + float((x**2 + y**2).max())  # a turn moves more in the corners than in the middle
+        # A turn moves more in the corners than in the middle.
+        stretch = math.sqrt(1.0 + float((x**2 + y**2).max()))
         centre, _ = camera_pose(motion.pose, renderer.mount)
         over_ground_m = -float(centre[2]) - self._surface.at(float(centre[0]), float(centre[1]))
         nearest_m = max(_NEAREST_M, min(over_ground_m, nearest_wire_m(self._wires, centre)))
         by_moving = float(np.linalg.norm(motion.velocity_ned_m_s)) / nearest_m
-        by_turning = float(np.linalg.norm(motion.rates_frd_rad_s))
-        return (
-            renderer.intrinsics.fx_px * duration_s * math.sqrt(stretch) * (by_moving + math.sqrt(stretch) * by_turning)
-        )
+        by_turning = stretch * float(np.linalg.norm(motion.rates_frd_rad_s))
+        return float(stretch * renderer.intrinsics.fx_px * duration_s * (by_moving + by_turning))
 
 
 @njit(nogil=True, cache=True)  # type: ignore[untyped-decorator]
