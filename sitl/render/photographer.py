@@ -21,7 +21,7 @@ _SHARP_PX = 0.3  # a smear shorter than this does not show beside the lens's blu
 _NEAREST_M = 0.3
 _MOST_SUB_POSES = 12
 _GROUND_STEP_PX = 1.5
-_MOST_STRIPS = 24
+_MOST_STRIPS = 48
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -101,7 +101,7 @@ class Photographer:
         for top, bottom in itertools.pairwise(edges.tolist()):
             middle_s = shutter.row_s((top + bottom - 1) / 2.0, intrinsics.height_px)
             for dt_s in sub_times_s(exposure_s, n_poses):
-                np.copyto(light, ground)
+                light[top:bottom] = ground[top:bottom]  # what was drawn beyond the strip does not count
                 renderer.add_line(light, motion.pose_at(middle_s + dt_s))
                 cv2.scaleAdd(light[top:bottom], 1.0 / n_poses, gathered[top:bottom], dst=gathered[top:bottom])
         return gathered
