@@ -231,9 +231,9 @@ COLUMNS = (
 def grouped(title: str, flights: list[Flown], key: Callable[[Flown], object]) -> list[str]:
     """A table with a line for each value of a key."""
     lines = ["| " + " | ".join((title, *COLUMNS)) + " |", "|" + " --- |" * (len(COLUMNS) + 1)]
-    for value in dict.fromkeys(key(flown) for flown in flights):
-        lines.append(row(str(value), [flown for flown in flights if key(flown) == value]))
-    return [*lines, ""]
+    values = dict.fromkeys(key(flown) for flown in flights)
+    rows = [row(str(value), [flown for flown in flights if key(flown) == value]) for value in values]
+    return [*lines, *rows, ""]
 
 
 def page(flights: list[Flown], wall_s: float, processes: int) -> str:
@@ -244,10 +244,11 @@ def page(flights: list[Flown], wall_s: float, processes: int) -> str:
     lines = [
         "# Following, benchmarked",
         "",
-        "`make bench-following` regenerates this page. Each flight is a dry-run in virtual time with rendered frames and "
-        "vision in the loop; wind is the mean at 20 ft with its Dryden gusts. All distances are to the simulated truth, "
-        f"while aligning and following. A vehicle {WRONG_M:g} m off the line for {WRONG_S:g} s has followed something else. "
-        f"{len(flights)} flights in {wall_s / 60:.0f} min, {processes} at a time; {speed:.1f} times real time each.",
+        "`make bench-following` regenerates this page. Each flight is a dry-run in virtual time with rendered frames "
+        "and vision in the loop; wind is the mean at 20 ft with its Dryden gusts. All distances are to the simulated "
+        f"truth, while aligning and following. A vehicle {WRONG_M:g} m off the line for {WRONG_S:g} s has followed "
+        f"something else. {len(flights)} flights in {wall_s / 60:.0f} min, {processes} at a time; {speed:.1f} times "
+        "real time each.",
         "",
         *grouped("", calm, lambda flown: "all, up to 8 m/s"),
         "## By wind",

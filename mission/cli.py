@@ -13,6 +13,8 @@ from mission.camera_commands import app as camera_app
 from mission.ending import EXIT_BAD_INPUT, EXIT_FAILED_FILE, EXIT_FAULT, fail, print_report, read_mission, read_report
 from mission.fly_commands import JsonOption, MissionArgument
 from mission.log.errors import LogError
+from mission.simulated.world_commands import app as world_app
+from mission.simulated.world_pictures import app as pictures_app
 
 app = typer.Typer(
     help="Fly a multirotor along a power line by sight.",
@@ -23,6 +25,8 @@ app = typer.Typer(
 )
 
 app.add_typer(camera_app, name="camera")
+world_app.add_typer(pictures_app)  # without a name of its own: its commands stand beside the others
+app.add_typer(world_app, name="world")
 
 # vision.pipeline.Detector, without its import
 DetectorName = Literal["projection", "cbs", "steerable", "hough", "lsd", "edlines"]

@@ -9,6 +9,8 @@ from drivers.camera.mailbox import Mailbox
 from drivers.clock import NS_PER_S, ScaledClock
 from sitl.pose import Pose, PoseBlock
 from sitl.render.lens import CameraMount
+from sitl.render.motion import Motion, Shutter, motion_between
+from sitl.render.photographer import Photographer
 from sitl.render.renderer import Renderer
 from sitl.render.sensor import Optics
 from sitl.world.file import WorldError, load_world
@@ -25,6 +27,9 @@ class SimCamera:
     count in `seq`. `seed` is that of the sensor's noise, `light`
     the light of the day (None: the world's own). Entering it paints the world and compiles, which takes
     seconds, and raises CameraError when the world or the pose block is not there.
+    count in `seq`. `seed` is that of the sensor's noise; `shutter` says how the frames are exposed while the vehicle
+    moves; its motion is that from one frame's pose to the next one's. Entering it paints the world and compiles, which
+    takes seconds, and raises CameraError when the world or the pose block is not there.
     """
 
     def __init__(
@@ -39,6 +44,7 @@ class SimCamera:
         mount: CameraMount | None = None,
         optics: Optics | None = None,
         light: LightName | None = None,
+        shutter: Shutter | None = None,
     ) -> None:
         self._world = world
         self._pose_block = pose_block
@@ -49,6 +55,7 @@ class SimCamera:
         self._mount = mount
         self._optics = optics
         self._light = light
+        self._shutter = shutter
         self._mailbox: Mailbox[Frame] = Mailbox()
         self._stop = threading.Event()
         self._thread: threading.Thread | None = None
@@ -75,10 +82,12 @@ class SimCamera:
         except WorldError as error:
             poses.close()
             raise CameraError(str(error)) from error
-        renderer.render(Pose(0, 0.0, 0.0, -1.0, (1.0, 0.0, 0.0, 0.0)), 0)  # compiles, before time counts
+        self._compile(renderer)
         self._mailbox = Mailbox()
         self._stop.clear()
-        self._thread = threading.Thread(target=self._grab, args=(renderer, poses), name="sim-camera", daemon=True)
+        self._thread = threading.Thread(
+            target=self._grab, args=(Photographer(renderer, self._shutter), poses), name="sim-camera", daemon=True
+        )
         self._thread.start()
         return self
 
@@ -91,11 +100,18 @@ class SimCamera:
             self._thread = None
         self._mailbox.close()
 
-    def _grab(self, renderer: Renderer, poses: PoseBlock) -> None:
-        """Render a frame at each frame time that is not over yet; runs in the grabber thread until told to stop."""
+    def _compile(self, renderer: Renderer) -> None:
+        """Take a picture that is blurred and one that is not, before time counts."""
+        pose = Pose(0, 0.0, 0.0, -1.0, (1.0, 0.0, 0.0, 0.0))
+        for speed_m_s in (0.0, 100.0):
+            Photographer(renderer, self._shutter).take(Motion(pose, (speed_m_s, 0.0, 0.0)), 0)
+
+    def _grab(self, photographer: Photographer, poses: PoseBlock) -> None:
+        """Take a frame at each frame time that is not over yet; runs in the grabber thread until told to stop."""
         period_ns = NS_PER_S / self._rate_hz
         start_ns = self._clock.now_ns()
         seq = 0
+        motion: Motion | None = None
         try:
             while True:
                 early_s = (start_ns + seq * period_ns - self._clock.now_ns()) / NS_PER_S
@@ -103,7 +119,9 @@ class SimCamera:
                     return
                 pose = poses.read()
                 if pose is not None:
-                    image = renderer.render(pose, seq)
+                    if motion is None or pose.t_ns != motion.pose.t_ns:  # the same pose again tells nothing new
+                        motion = motion_between(None if motion is None else motion.pose, pose)
+                    image = photographer.take(motion, seq).image
                     image.flags.writeable = False
                     self._mailbox.put(Frame(seq, pose.t_ns, image))
                 seq = max(seq + 1, int((self._clock.now_ns() - start_ns) / period_ns) + 1)

@@ -20,6 +20,7 @@ from drivers.clock import NS_PER_S
 from mission.eyes import Notice
 from mission.simulated.in_process import InProcessAutopilot
 from sitl.pose import Pose
+from sitl.render.motion import Motion
 from vision.pipeline import LineFinder, VisionSettings
 from vision.records import BLINDING, VisionReport
 from vision.worker_process import Reporter
@@ -27,8 +28,8 @@ from vision.worker_process import Reporter
 LATENCY_S = 0.06
 """From capture to the estimate: what a companion computer needs, at a camera's exposure and transfer included."""
 
-Photograph = Callable[[Pose, int], NDArray[np.uint8]]
-"""The image (height, width, 3) uint8 BGR at a pose; the second argument is the frame's number."""
+Photograph = Callable[[Motion, int], NDArray[np.uint8]]
+"""The image (height, width, 3) uint8 BGR at a pose in motion; the second argument is the frame's number."""
 
 
 @dataclass(slots=True)
@@ -133,8 +134,9 @@ class RenderedEyes:
         self._n_frames += 1
         vehicle = self._autopilot.sim.vehicle
         pose = Pose(now_ns, *vehicle.position_m, vehicle.quaternion)
+        motion = Motion(pose, vehicle.velocity_m_s, vehicle.rates_rad_s)
         due_ns = now_ns + round(LATENCY_S * NS_PER_S)
-        image = self._camera_thread.submit(self._photograph, pose, seq)
+        image = self._camera_thread.submit(self._photograph, motion, seq)
         self._waiting.append((due_ns, self._vision_thread.submit(self._look, seq, now_ns, due_ns, image)))
 
     def _look(self, seq: int, t_capture_ns: int, due_ns: int, image: Future[NDArray[np.uint8]]) -> VisionReport:

@@ -32,6 +32,7 @@ from mission.simulated.simulation import true_line
 from mission.simulated.virtual_time import VirtualClock, run_virtually
 from sitl.autopilot import SimAutopilot
 from sitl.outfit import outfit
+from sitl.render.photographer import Photographer
 from sitl.render.renderer import Renderer
 from sitl.vehicle import euler_of
 from sitl.world.file import load_world
@@ -62,7 +63,7 @@ def fly_virtually(
         seed=scenario.seed,
         gust_fronts=scenario.has_gust_fronts,
     )
-    renderer = Renderer(world, camera, seed=scenario.seed)
+    photographer = Photographer(Renderer(world, camera, seed=scenario.seed))
     path = log_path(log_folder, plan.name, datetime.now(UTC))
 
     async def flight() -> tuple[FlightOutcome, float]:
@@ -79,7 +80,7 @@ def fly_virtually(
         )
         eyes = RenderedEyes(
             autopilot,
-            renderer.render,
+            lambda motion, seq: photographer.take(motion, seq).image,
             vision_settings(plan, camera),
             plan.camera.rate_hz,
             plan.vision.log_rate_hz,

@@ -52,6 +52,19 @@ class CameraMount:
         object.__setattr__(self, "body_from_camera", rotation)
 
 
+def _looking_ahead(down_rad: float) -> NDArray[np.float64]:
+    """Image right is vehicle right, and the axis points ahead and `down_rad` [rad] below the vehicle's nose."""
+    c, s = math.cos(down_rad), math.sin(down_rad)
+    return np.array([[0.0, -s, c], [1.0, 0.0, 0.0], [0.0, c, s]])
+
+
+DOWN = CameraMount()
+"""The camera that a flight follows the line with."""
+
+FRONT = CameraMount((0.12, 0.0, 0.03), _looking_ahead(math.radians(20.0)))
+"""A camera at the vehicle's nose that looks ahead and 20 degrees down."""
+
+
 def ned_from_body(pose: Pose) -> NDArray[np.float64]:
     """The rotation (3, 3) float64 that turns FRD body vectors into NED."""
     w, x, y, z = pose.quaternion

@@ -8,13 +8,14 @@ from numpy.typing import NDArray
 
 from drivers.camera.camera import Intrinsics
 from sitl.pose import Pose
+from sitl.render.exposure import SUNNY_S, Exposure
 from sitl.render.renderer import Renderer
 from sitl.render.sensor import Optics
 from sitl.world.records import World
 
 _ABOVE_M = 20_000.0  # from so high, a pole 10 m tall leans by less than a centimetre for each 20 m off the centre
 _WIRE_PX = 1.3
-_FLAWLESS = Optics(blur_px=0.45, corner_light=1.0, read_noise=0.0, shot_noise=0.0)
+_FLAWLESS = Optics(blur_px=0.45, corner_light=1.0, read_noise=0.0, shot_noise=0.0, has_glare=False)
 
 
 def render_map(world: World, bounds_ne_m: tuple[float, float, float, float], px_per_m: float) -> NDArray[np.uint8]:
@@ -36,4 +37,6 @@ def render_map(world: World, bounds_ne_m: tuple[float, float, float, float], px_
     clear = dataclasses.replace(world, light=dataclasses.replace(world.light, visibility_m=math.inf))
     renderer = Renderer(clear, camera, optics=_FLAWLESS, wire_at_least_m=_WIRE_PX / px_per_m)
     north_m, east_m = (north_min_m + north_max_m) / 2.0, (east_min_m + east_max_m) / 2.0
-    return renderer.render(Pose(0, north_m, east_m, -_ABOVE_M, (1.0, 0.0, 0.0, 0.0)), 0)
+    # A map is as bright at dusk as at noon.
+    exposure = Exposure(SUNNY_S / (world.light.direct + world.light.sky))
+    return renderer.render(Pose(0, north_m, east_m, -_ABOVE_M, (1.0, 0.0, 0.0, 0.0)), 0, exposure)

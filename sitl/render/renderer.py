@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from drivers.camera.camera import Intrinsics
 from sitl.pose import Pose
 from sitl.render.daylight import daylight_of, light_map
+from sitl.render.exposure import SUNNY, Exposure
 from sitl.render.ground import GroundView
 from sitl.render.lens import CameraMount, camera_pose, lens_vector, ray_table
 from sitl.render.linework import build_linework
@@ -16,7 +17,7 @@ from sitl.render.merge import draw_linework
 from sitl.render.paint import ground_of
 from sitl.render.projection import clip_to_view, project_point
 from sitl.render.relief import Relief
-from sitl.render.sensor import Optics, blur, develop, fall_off, noise_table, tone_curve
+from sitl.render.sensor import Optics, Sensor
 from sitl.world.height_grid import HeightGrid
 from sitl.world.records import Light, World
 from sitl.world.surface import surface_of
@@ -48,10 +49,8 @@ class Renderer:
         wire_at_least_m: float = 0.0,
     ) -> None:
         self.intrinsics = intrinsics
-        self._world = world
+        self.world = world
         self.mount = CameraMount() if mount is None else mount
-        self._optics = Optics() if optics is None else optics
-        self._seed = seed
         self._linework = build_linework(world, wire_at_least_m)
         self._sun_ned = np.array(world.light.direction_ned)
         self._day = daylight_of(world.light)
@@ -66,9 +65,7 @@ class Renderer:
         self._coverage = np.zeros(shape, dtype=np.float32)
         self._shaded = np.zeros(shape, dtype=np.float32)
         self._strips = np.empty((_MOST_STRIPS, 8), dtype=np.float64)
-        self._fall_off = fall_off(intrinsics.width_px, intrinsics.height_px, self._optics.corner_light)
-        self._noise = noise_table(seed)
-        self._tone = tone_curve()
+        self.sensor = Sensor(self.rays, Optics() if optics is None else optics, seed)
 
     def light(self, pose: Pose) -> NDArray[np.float32]:
         """The light that comes through the lens at a pose: (height, width, 3) float32 linear BGR.
@@ -103,24 +100,19 @@ class Renderer:
         self._draw_lines(self._light, nearest, centre, ned_from_camera)
         return np.where(nearest > 0.0, 1.0 / np.maximum(nearest, 1e-12), np.inf).astype(np.float32)
 
-    def render(self, pose: Pose, seq: int) -> NDArray[np.uint8]:
+    def ground_depth_at(self, rows: NDArray[np.int64], columns: NDArray[np.int64]) -> NDArray[np.float32]:
+        """How far the ground is that was looked at last, at those rows and columns: (rows, columns) float32 [m]."""
+        inverse = self._ground.inverse[np.ix_(rows, columns)]
+        return np.where(inverse > 0.0, 1.0 / np.maximum(inverse, 1e-12), np.inf).astype(np.float32)
+
+    def render(self, pose: Pose, seq: int, exposure: Exposure = SUNNY) -> NDArray[np.uint8]:
         """The image (height, width, 3) uint8 BGR at a pose; `seq` chooses the noise."""
-        light = blur(self.light(pose), self._optics.blur_px)
-        image = np.empty_like(light, dtype=np.uint8)
-        rng = np.random.default_rng((self._seed, seq))
-        row_starts = rng.integers(0, len(self._noise) - 3 * image.shape[1], len(image))
-        develop(
-            light.reshape(len(light), -1),
-            self._fall_off,
-            1.0,
-            self._optics.read_noise,
-            self._optics.shot_noise,
-            self._noise,
-            row_starts,
-            self._tone,
-            image.reshape(len(image), -1),
-        )
-        return image
+        return self.sensor.expose(self.light(pose), exposure, seq, self.sun_camera(pose))
+
+    def sun_camera(self, pose: Pose) -> NDArray[np.float64]:
+        """Towards the sun, (3,) in the camera frame, as long as its light is bright (Light.direct)."""
+        _, ned_from_camera = camera_pose(pose, self.mount)
+        return self.world.light.direct * (self._sun_ned @ ned_from_camera)
 
     def _draw_lines(
         self,
@@ -145,7 +137,7 @@ class Renderer:
         """
         centre, ned_from_camera = camera_pose(pose, self.mount)
         pieces = []
-        for conductor in self._world.conductors:
+        for conductor in self.world.conductors:
             points = (conductor.points_ned_m - centre) @ ned_from_camera
             rows = []
             for p, q in itertools.pairwise(points):

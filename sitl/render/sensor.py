@@ -1,4 +1,4 @@
-"""What lens and sensor make of the light: blur, fall-off to the corners, noise and the tone curve."""
+"""What lens and sensor make of the light: blur, glare, fall-off to the corners, noise and the tone curve."""
 
 import math
 from dataclasses import dataclass
@@ -7,6 +7,9 @@ import cv2
 import numpy as np
 from numba import njit
 from numpy.typing import NDArray
+
+from sitl.render.exposure import Exposure
+from sitl.render.glare import add_glare, find_glare, sample, small_rays
 
 _TONE_STEPS = 4096
 _N_NOISE = 1 << 18
@@ -18,13 +21,67 @@ class Optics:
 
     `blur_px` is the standard deviation of the lens's blur, `corner_light` the light in the image's corners compared
     with its middle, `read_noise` and `shot_noise` the noise of a dark and, added in quadrature and growing with the
-    square root of the light, of a white pixel, in units of white.
+    square root of the light, of a white pixel, in units of white, both at gain 1. `has_glare` says whether the lens
+    scatters light.
     """
 
     blur_px: float = 0.55
     corner_light: float = 0.72
     read_noise: float = 0.003
     shot_noise: float = 0.018
+    has_glare: bool = True
+
+
+class Sensor:
+    """Turns light into images; the same light, exposure and `seq` give the same image. `rays` is lens.ray_table's.
+
+    At a higher gain a pixel is white with fewer electrons: the read noise grows with the gain, and the shot noise,
+    which is the square root of the electrons' number, with its square root.
+    """
+
+    def __init__(self, rays: NDArray[np.float32], optics: Optics, seed: int) -> None:
+        self._optics = optics
+        self._seed = seed
+        self._directions = small_rays(rays)
+        self._fall_off = fall_off(rays.shape[2], rays.shape[1], optics.corner_light)
+        self._noise = noise_table(seed)
+        self._tone = tone_curve()
+
+    def expose(
+        self, light: NDArray[np.float32], exposure: Exposure, seq: int, sun_camera: NDArray[np.float64]
+    ) -> NDArray[np.uint8]:
+        """The image (height, width, 3) uint8 BGR of `light` (height, width, 3) float32 BGR; `seq` chooses the noise.
+
+        Light is linear, in units of a white sheet at a clear noon; `sun_camera` is find_glare()'s.
+        """
+        optics = self._optics
+        glare = self.glare(light, exposure, sun_camera)
+        seen = blur(light, optics.blur_px)
+        if glare is not None:
+            seen = add_glare(seen.copy() if seen is light else seen, glare)
+        height_px, width_px = light.shape[:2]
+        image = np.empty((height_px, width_px, 3), dtype=np.uint8)
+        rng = np.random.default_rng((self._seed, seq))
+        develop(
+            seen.reshape(height_px, -1),
+            self._fall_off,
+            exposure.scale,
+            optics.read_noise * exposure.gain,
+            optics.shot_noise * math.sqrt(exposure.gain),
+            self._noise,
+            rng.integers(0, len(self._noise) - 3 * width_px, height_px),
+            self._tone,
+            image.reshape(height_px, -1),
+        )
+        return image
+
+    def glare(
+        self, light: NDArray[np.float32], exposure: Exposure, sun_camera: NDArray[np.float64]
+    ) -> NDArray[np.float32] | None:
+        """The glare over `light` on every eighth pixel, or None; see find_glare()."""
+        if not self._optics.has_glare or not self._directions.size:
+            return None
+        return find_glare(sample(light), exposure.scale, self._directions, sun_camera)
 
 
 def fall_off(width_px: int, height_px: int, corner_light: float) -> NDArray[np.float32]:

@@ -59,6 +59,22 @@ def test_frames_show_the_newest_pose(poses: PoseBlock) -> None:
         assert np.abs(high.image.astype(int) - low.image.astype(int)).mean() > 5.0
 
 
+def test_frames_are_smeared_by_the_way_between_their_poses(poses: PoseBlock) -> None:
+    """So fast that a noon's exposure smears, the ground loses its grain along the flight; standing still, not."""
+    grains = []
+    for step_m in (0.0, 150.0):
+        poses.write(Pose(1_000_000_000, 9.0 - step_m, 4.1, -8.0, LEVEL))
+        with camera_on(poses) as camera:
+            next_frame(camera)
+            poses.write(Pose(1_100_000_000, 9.0, 4.1, -8.0, LEVEL))
+            frame = next_frame(camera)
+            while frame.t_capture_ns != 1_100_000_000:
+                frame = next_frame(camera)
+        green = frame.image[:, :, 1].astype(float)
+        grains.append(np.abs(np.diff(green, axis=0)).mean())
+    assert 0.0 < grains[1] < 0.8 * grains[0]
+
+
 def test_frames_missed_by_the_reader_and_by_the_renderer_count(poses: PoseBlock) -> None:
     """At 100 kHz no renderer keeps up: the numbers must tell of the frames that were never made."""
     poses.write(Pose(1, 0.0, 0.0, -5.0, LEVEL))

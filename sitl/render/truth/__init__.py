@@ -1,0 +1,1 @@
+"""What is truly in a rendered picture: which pixels, how far, which lines and boxes."""
