@@ -17,6 +17,8 @@ MIN_TURN_RAD = math.radians(8.0)
 MAX_TURN_RAD = math.radians(70.0)  # angle supports turn by 60 degrees and little more
 _MIN_SHARE = 0.15  # of its chord that a span has in the frame, for there to be something to judge
 _OVERLAP = 0.04  # share of the diagonal by which a conductor may go on beyond the bend
+_MOST_OVERLAP = 3.0  # times that, for the middle one
+_LOOSE = 0.5  # of the support that a line across the frame must have: one that ends is often taken for longer
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,23 +43,23 @@ class Bend:
 
 def find_bend(
     conductors: list[Conductor],
-    group: list[Conductor],
     shape: tuple[int, int],
     tolerance_rad: float,
     min_support: float,
     min_contrast: float,
 ) -> Bend | None:
-    """Find the span that meets the `group`'s; None where there is no such span among `conductors`.
+    """Find two spans that meet among `conductors`; None where there are none.
 
-    `shape` is the frame's (height, width), the last three as for line_group.choose_group. As many conductors, but for
+    `shape` is the frame's (height, width), the last three are as for line_group.choose_group. As many conductors, but for
     one, have to be in both, and each has to end where the bend is: lines that cross go on.
     """
+    group, _ = choose_group(conductors, tolerance_rad, _LOOSE * min_support, min_contrast)
     if not group:
         return None
     one = _span(group, shape)
     is_other = line_angle_distance_rad(np.array([c.angle_rad for c in conductors]), one.angle_rad) >= MIN_TURN_RAD
     rest = [conductor for conductor, keeps in zip(conductors, is_other, strict=True) if keeps]
-    others, _ = choose_group(rest, tolerance_rad, min_support, min_contrast)
+    others, _ = choose_group(rest, tolerance_rad, _LOOSE * min_support, min_contrast)
     if not others or abs(len(others) - len(group)) > 1:
         return None
     other = _span(others, shape)
@@ -118,7 +120,7 @@ def _ends_there(
 ) -> bool:
     """Whether the span's conductors keep to their side of the line that halves the bend, where each of them bends.
 
-    Most of them must: one may go on for a while along something else that the frame shows there.
+    One must, and most of them nearly: edges may go on for a while along something else that the frame shows there.
     """
     across = (way[0] - other_way[0], way[1] - other_way[1])
     norm = math.hypot(*across)
@@ -126,7 +128,7 @@ def _ends_there(
     for x1, y1, x2, y2 in (conductor.axis for conductor in span.conductors):
         sides = [_dot((x - meeting[0], y - meeting[1]), across) / norm for x, y in ((x1, y1), (x2, y2))]
         beyond_px.append(-min(sides))
-    return float(np.median(beyond_px)) <= slack_px
+    return min(beyond_px) <= slack_px and float(np.median(beyond_px)) <= _MOST_OVERLAP * slack_px
 
 
 def _visible_share(meeting: tuple[float, float], way: tuple[float, float], shape: tuple[int, int]) -> float:

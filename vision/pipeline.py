@@ -136,7 +136,6 @@ class LineFinder:
         )
         bend = find_bend(
             conductors,
-            group,
             shape,
             settings.main_angle_tolerance_rad,
             settings.min_relative_support,
