@@ -40,6 +40,7 @@ def guidance_settings(plan: p.GuidancePlan) -> GuidanceSettings:
         lateral_max_m_s=plan.lateral_max_m_s,
         lateral_lead=plan.lateral_lead,
         height_over_line_m=plan.height_over_line_m,
+        conductor_spacing_m=plan.conductor_spacing_m,
         leash_m=plan.leash_m,
         arrival_m=plan.arrival_m,
         max_estimate_age_s=plan.max_estimate_age_s,

@@ -95,6 +95,12 @@ class Executive:
         """Whether the vehicle was armed, or told to without a refusal."""
         return self._helm.was_told_to_arm or self._situation.was_armed
 
+    @property
+    def needs_vision(self) -> bool:
+        """Whether what is flown now needs eyes; before the flight they are looked through, too."""
+        flown = self._flow.flown
+        return flown is None or flown.needs_vision
+
     def request_stop(self) -> None:
         """Ask the flight to end now: before arming at once, in the air by the mission's reaction."""
         self._situation.is_interrupted = True

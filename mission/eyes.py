@@ -7,7 +7,7 @@ from typing import Protocol
 from drivers.camera.camera import Intrinsics
 from drivers.clock import NS_PER_S
 from mission.autopilot import VehicleState
-from mission.guidance import GuidanceSettings, locate_line, wrap_angle_rad
+from mission.guidance import GuidanceSettings, height_over_m, locate_line, wrap_angle_rad
 from mission.known_line import KnownLine
 from mission.records import Event, Severity
 from mission.reporting import FlightLog
@@ -144,15 +144,16 @@ def sight_of(
     state = history.at(report.t_capture_ns)
     if state is None:
         return None
-    line, next_line, is_whole = None, None, False
+    line, next_line, height_m, is_whole = None, None, None, False
     estimate = report.estimate
     if estimate is not None:
-        line = locate_line(estimate, state, camera, guidance.height_over_line_m)
         is_whole = group.is_whole(estimate.n_lines)
+        height_m = height_over_m(estimate, camera, guidance.conductor_spacing_m) if is_whole else None
+        line = locate_line(estimate, state, camera, height_m or guidance.height_over_line_m)
         if estimate.next_span is not None:
             span = estimate.next_span
             beyond = replace(estimate, angle_rad=span.angle_rad, offset_px=span.offset_px)
-            next_line = locate_line(beyond, state, camera, guidance.height_over_line_m)
+            next_line = locate_line(beyond, state, camera, height_m or guidance.height_over_line_m)
     return Sight(
         report.t_capture_ns,
         state.yaw_rad,
@@ -163,6 +164,7 @@ def sight_of(
         state.east_m,
         state.down_m,
         next_line,
+        height_m,
     )
 
 

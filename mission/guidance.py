@@ -46,6 +46,7 @@ class GuidanceSettings:
     lateral_max_m_s: float
     lateral_lead: float
     height_over_line_m: float
+    conductor_spacing_m: float | None
     leash_m: float
     arrival_m: float
     max_estimate_age_s: float
@@ -82,6 +83,13 @@ class WorldLine:
             return None
         d_north_m, d_east_m = self.north_m - north_m, self.east_m - east_m
         return (d_north_m * math.sin(self.heading_rad) - d_east_m * math.cos(self.heading_rad)) / sine
+
+
+def height_over_m(estimate: LineEstimate, camera: Intrinsics, spacing_m: float | None) -> float | None:
+    """The height over conductors that lie `spacing_m` apart [m]; None where it cannot be told from this estimate."""
+    if spacing_m is None or estimate.spacing_px is None or estimate.spacing_px < 1.0:
+        return None
+    return spacing_m * camera.fx_px / estimate.spacing_px
 
 
 def locate_line(

@@ -217,6 +217,13 @@ class GuidancePlan(_Section):
         le=100,
         description="Roughly; scales the image offset to metres, and tells conductors from what lies below them.",
     )
+    conductor_spacing_m: float | None = Field(
+        None,
+        gt=0,
+        le=20,
+        description="Between neighbouring conductors, seen from above. Where it is given, the height over them is "
+        "measured, and follow_lines holds height_over_line_m; it never sinks below where it began.",
+    )
     leash_m: float = Field(4.0, gt=0, le=20, description="The setpoint never runs further ahead of the vehicle.")
     arrival_m: float = Field(0.6, gt=0, le=5, description="The vehicle is there when it is this near.")
     max_estimate_age_s: float = Field(0.5, gt=0, le=5, description="Older estimates do not steer.")

@@ -50,8 +50,8 @@ def find_bend(
 ) -> Bend | None:
     """Find two spans that meet among `conductors`; None where there are none.
 
-    `shape` is the frame's (height, width), the last three are as for line_group.choose_group. As many conductors, but for
-    one, have to be in both, and each has to end where the bend is: lines that cross go on.
+    `shape` is the frame's (height, width), the last three are as for line_group.choose_group. As many conductors, but
+    for one, have to be in both, and they have to end where the bend is: lines that cross go on.
     """
     group, _ = choose_group(conductors, tolerance_rad, _LOOSE * min_support, min_contrast)
     if not group:

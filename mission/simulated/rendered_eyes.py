@@ -28,6 +28,9 @@ from vision.worker_process import Reporter
 LATENCY_S = 0.06
 """From capture to the estimate: what a companion computer needs, at a camera's exposure and transfer included."""
 
+IDLE_RATE_HZ = 5.0
+"""Frames a second in tasks that need no eyes, as a take-off: rendering takes nearly all of a flight's time."""
+
 Photograph = Callable[[Motion, int], NDArray[np.uint8]]
 """The image (height, width, 3) uint8 BGR at a pose in motion; the second argument is the frame's number."""
 
@@ -50,7 +53,9 @@ class _StoppedClock:
 class RenderedEyes:
     """mission.eyes.Eyes on the vehicle of `autopilot`; a context manager, which warms up and ends the threads.
 
-    `photograph` renders in a thread of its own. `log_rate_hz` [1/s] says how often a report carries its frame.
+    `photograph` renders in a thread of its own. `log_rate_hz` [1/s] says how often a report carries its frame. While
+    `is_needed` says that nobody steers by what is seen, only IDLE_RATE_HZ frames a second are taken, and the others
+    count as dropped.
     """
 
     failure: str | None = None
@@ -62,7 +67,9 @@ class RenderedEyes:
         settings: VisionSettings,
         rate_hz: float,
         log_rate_hz: float,
+        is_needed: Callable[[], bool] = lambda: True,
     ) -> None:
+        self._is_needed = is_needed
         self._autopilot = autopilot
         self._photograph = photograph
         self._finder = LineFinder(settings)
@@ -70,6 +77,7 @@ class RenderedEyes:
         self._reporter = Reporter(self._finder, self._clock, log_rate_hz)
         self._period_ns = NS_PER_S / rate_hz
         self._n_frames = 0
+        self._last_ns = 0
         self._waiting: deque[tuple[int, Future[VisionReport]]] = deque()
         self._last: VisionReport | None = None
         self._notices: list[Notice] = []
@@ -132,6 +140,9 @@ class RenderedEyes:
             return
         seq = self._n_frames
         self._n_frames += 1
+        if not self._is_needed() and now_ns < self._last_ns + NS_PER_S / IDLE_RATE_HZ:
+            return
+        self._last_ns = now_ns
         vehicle = self._autopilot.sim.vehicle
         pose = Pose(now_ns, *vehicle.position_m, vehicle.quaternion)
         motion = Motion(pose, vehicle.velocity_m_s, vehicle.rates_rad_s)

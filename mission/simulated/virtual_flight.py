@@ -68,6 +68,7 @@ def fly_virtually(
 
     async def flight() -> tuple[FlightOutcome, float]:
         clock = VirtualClock()
+        executive: Executive | None = None
         autopilot = InProcessAutopilot(clock, sim)
         recorder = Recorder(
             path,
@@ -84,6 +85,7 @@ def fly_virtually(
             vision_settings(plan, camera),
             plan.camera.rate_hz,
             plan.vision.log_rate_hz,
+            lambda: executive is None or executive.needs_vision,
         )
         with recorder, eyes:
             recorder.record(true_line(world))

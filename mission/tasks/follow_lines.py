@@ -1,6 +1,8 @@
 """Follow the line: [Ceron] Algorithm 6.3, and its centred variant."""
 
 import math
+import statistics
+from collections import deque
 from dataclasses import replace
 
 from mission.autopilot import Setpoint
@@ -10,6 +12,7 @@ from mission.guidance import (
     nearest_heading_rad,
     step_along,
     step_sideways,
+    step_vertical,
     turn_towards_rad,
     wrap_angle_rad,
 )
@@ -22,6 +25,8 @@ _STRAIGHT_RAD = math.radians(5.0)  # a turn that is left and takes no speed away
 _TURN_RAD = math.radians(25.0)  # and over which it does
 _PICK_UP_S = 1.5
 _SAME_RAD = math.radians(6.0)  # two sights of one span differ by less
+_N_HEIGHTS = 15  # sights whose median is believed
+_CLIMB_M_S = 0.7
 _PASSED_M = 1.0  # so far behind the vehicle, a bend in view is still one to turn at
 
 
@@ -45,6 +50,8 @@ class FollowLinesTask:
         self._line: WorldLine | None = None
         self._unseen_s = 0.0
         self._course_rad = 0.0
+        self._heights_m: deque[float] = deque(maxlen=_N_HEIGHTS)
+        self._lowest_down_m: float | None = None
         self._pace = 1.0
         self._bend_m: float | None = None  # how far ahead of the setpoint the line bends
         self._left: float | None = None  # the heading of the span before the last bend, while that is in sight
@@ -90,9 +97,22 @@ class FollowLinesTask:
                 seen.dt_s,
                 beyond_m=guidance.lateral_lead * vehicle_off_m,
             )
+        setpoint = self._hold_height(setpoint, seen)
         if left_m <= NEARLY_M and is_there(seen.state, setpoint, guidance.arrival_m):
             return Step(setpoint, done=f"followed the line for {self._distance_m:g} m")
         return Step(setpoint)
+
+    def _hold_height(self, setpoint: Setpoint, seen: Observation) -> Setpoint:
+        """Climb and sink with the conductors, where the height over them is known; never below where the task began."""
+        if self._lowest_down_m is None:
+            self._lowest_down_m = setpoint.down_m
+        if seen.sight is not None and seen.sight.height_m is not None:
+            self._heights_m.append(seen.sight.height_m)
+        if len(self._heights_m) < _N_HEIGHTS or not self._guidance.is_centred:
+            return setpoint
+        too_low_m = self._guidance.height_over_line_m - statistics.median(self._heights_m)
+        down_m = min(seen.state.down_m - too_low_m, self._lowest_down_m)
+        return step_vertical(setpoint, down_m, _CLIMB_M_S, seen.dt_s)
 
     def _see(self, reference: Setpoint, sight: Sight, line: WorldLine) -> None:
         """Choose between the spans in sight: on the one that is followed, until the setpoint is at the bend."""

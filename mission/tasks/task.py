@@ -21,7 +21,8 @@ class Sight:
 
     `line` is the estimate put on the map with the vehicle's pose at the time of capture. Its heading always counts; its
     place only where `is_whole`: when the frame showed all of the line's conductors, as far as known. The vehicle was at
-    `north_m`, `east_m`, `down_m` then. `next_line` is the span on the other side of an angle support in view.
+    `north_m`, `east_m`, `down_m` then. `next_line` is the span on the other side of an angle support in view,
+    `height_m` the height over the conductors, where all of them were seen and their spacing is known.
     """
 
     t_capture_ns: int
@@ -33,6 +34,7 @@ class Sight:
     east_m: float = 0.0
     down_m: float = 0.0
     next_line: WorldLine | None = None
+    height_m: float | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -249,3 +249,44 @@ def test_land_is_commanded_again_when_the_autopilot_is_not_on_that_way() -> None
     hovering = state_at(UP, mode=FlightMode.HOLD)
     commands = [task.step(UP, Observation(1.0, hovering, None)).command for _ in range(7)]
     assert commands == [Command.LAND, None, None, Command.LAND, None, None, Command.LAND]
+
+
+def test_following_holds_the_height_over_the_conductors_but_never_sinks_below_where_it_began() -> None:
+    guidance = guidance_settings(GuidancePlan(conductor_spacing_m=0.8, height_over_line_m=6.0))
+    task = build_task(FollowLines(task="follow_lines", distance_m=100.0), guidance, memory())
+    reference, line_down_m = UP, UP.down_m + 6.0
+    heights_m = []
+    for tick in range(600):
+        line_m = line_down_m - (3.0 if 150 < tick < 400 else -3.0 if tick >= 400 else 0.0)
+        seen = replace(sight(WorldLine(0.0, 0.0, 0.0), at=reference), height_m=line_m - reference.down_m)
+        reference = task.step(reference, Observation(0.05, state_at(reference), seen)).setpoint or reference
+        heights_m.append(-reference.down_m)
+    assert heights_m[140] == pytest.approx(16.0, abs=0.1)
+    assert heights_m[390] == pytest.approx(19.0, abs=0.1)
+    assert heights_m[-1] == pytest.approx(16.0, abs=0.1)
+    assert min(heights_m) > 15.99
+
+
+def test_following_turns_where_the_line_bends_and_not_where_it_is_seen_to() -> None:
+    """A bend 5 m ahead of the vehicle, in sight all the while: the setpoint goes on to it, and then along the next."""
+    here, beyond = WorldLine(0.0, 0.0, 0.0), WorldLine(math.radians(30.0), 5.0, 0.0)
+    task = build_task(FollowLines(task="follow_lines", distance_m=30.0), GUIDANCE, memory())
+    reference, track = UP, []
+    for _ in range(500):
+        spans = (here, beyond) if reference.north_m < 5.0 else (beyond, here)
+        seen = replace(sight(spans[0], reference.yaw_rad, at=reference), next_line=spans[1])
+        reference = task.step(reference, Observation(0.05, state_at(reference), seen)).setpoint or reference
+        track.append(reference)
+    before = [place for place in track if place.north_m < 4.5]
+    after = [place for place in track if place.north_m > 9.0]
+    assert max(abs(place.east_m) for place in before) < 0.05
+    assert max(abs(beyond.offset_m(place.north_m, place.east_m, beyond.heading_rad)) for place in after) < 0.1
+    assert (
+        max(
+            abs(beyond.offset_m(place.north_m, place.east_m, beyond.heading_rad))
+            for place in track[:-1]
+            if place.north_m > 5.0
+        )
+        < 0.4
+    )
+    assert track[-1].yaw_rad == pytest.approx(beyond.heading_rad, abs=0.02)
