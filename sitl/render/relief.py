@@ -21,7 +21,7 @@ _JUMP = 0.08
 _AROUND = 0.06  # of the depth: how far before and behind a thing's edge the thing may go on
 _NOTHING = -1e30
 _BUSY_M, _BUSY_FROM_M = 0.3, 250.0
-_MOST_FINE = 4000  # rays a frame may spend on each finer grid
+_MOST_FINE = 0.013  # of a frame's pixels: how many rays it may spend on each finer grid
 _NEAREST_M = 0.05
 _FINE_PX = 2.7  # smaller things may be rough
 
@@ -273,7 +273,7 @@ def _mark_odd(
     if step == COARSE_PX:
         return _TOLERANCES[0]
     for k in range(len(_TOLERANCES)):
-        if 5 * counts[k] <= _MOST_FINE:
+        if 5.0 * counts[k] <= _MOST_FINE * n_rows * n_columns * (1.0 if step > 2 else 0.5):
             return _TOLERANCES[k] if counts[k] > 0 else np.inf
     return np.inf
 
@@ -415,9 +415,14 @@ def find_inverse_depth(
                         continue
                     v, u = i * step, j * step
                     corners = inverse[v, u], inverse[v, u + step], inverse[v + step, u], inverse[v + step, u + step]
-                    near, far = max(corners), min(corners)
+                    near, far, far_v, far_u = max(corners), corners[0], v, u
+                    for k in range(1, 4):
+                        if corners[k] < far:
+                            far, far_v, far_u = corners[k], v + (k >> 1) * step, u + (k & 1) * step
+                    fall = r[2, 0] * rays[0, far_v, far_u] + r[2, 1] * rays[1, far_v, far_u] + r[2, 2]
+                    is_ground = far > 0.0 and fall > 1e-3
                     # Something near stands before something far: only what is near is looked for, and what it leaves
-                    # free is as far as at the corner.
+                    # free is as low as at the farthest corner.
                     from_m = (1.0 - _AROUND) / max(near, 1e-6)
                     to_m = (1.0 + _AROUND) / max(near, 1e-6)
                     if far * (1.0 + 2.0 * _AROUND) > near:
@@ -436,5 +441,14 @@ def find_inverse_depth(
                             r[0, 0] * x + r[0, 1] * y + r[0, 2], r[1, 0] * x + r[1, 1] * y + r[1, 2],
                             -(r[2, 0] * x + r[2, 1] * y + r[2, 2]), from_m, to_m, fine,
                         )  # fmt: skip
-                        inverse[vv, uu] = far if found == _NOTHING else found
+                        if found != _NOTHING:
+                            inverse[vv, uu] = found
+                            continue
+                        inverse[vv, uu] = far
+                        level = far * (r[2, 0] * x + r[2, 1] * y + r[2, 2]) / fall
+                        if is_ground and level > 1e-4:
+                            place_n = north_m + (r[0, 0] * x + r[0, 1] * y + r[0, 2]) / level
+                            place_e = east_m + (r[1, 0] * x + r[1, 1] * y + r[1, 2]) / level
+                            if height_at(up_m, place, place_n, place_e) < height_m - fall / far + _BUSY_M:
+                                inverse[vv, uu] = level
         step = half
