@@ -8,8 +8,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 from sitl.render.daylight import Daylight, sky_mix
+from sitl.render.depth import COARSE_PX, find_inverse_depth
 from sitl.render.paint import GroundTexture
-from sitl.render.relief import COARSE_PX, Relief, find_inverse_depth
+from sitl.render.relief import Relief
 from sitl.render.texture import Texture, dither, map_texture
 
 LIGHT_PX = 4
