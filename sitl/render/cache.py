@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-_KEPT = 16  # files; the ones not used for longest go first
+_KEPT = 10  # files of up to 300 MB; the ones not used for longest go first
 
 
 def cache_folder() -> Path:

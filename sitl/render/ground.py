@@ -8,8 +8,9 @@ from numba import njit
 from numpy.typing import NDArray
 
 from sitl.render.daylight import Daylight, sky_mix
+from sitl.render.depth import COARSE_PX, find_inverse_depth
 from sitl.render.paint import GroundTexture
-from sitl.render.relief import COARSE_PX, Relief, find_inverse_depth
+from sitl.render.relief import Relief
 from sitl.render.texture import Texture, dither, map_texture
 
 LIGHT_PX = 4
@@ -21,7 +22,7 @@ _LEAN = 0.7
 _GREY = (128.0, 128.0, 128.0, 128.0)
 
 
-@njit(nogil=True, cache=True, error_model="numpy", inline="always")  # type: ignore[untyped-decorator]
+@njit(nogil=True, cache=True, error_model="numpy", inline="always", fastmath=True)  # type: ignore[untyped-decorator]
 def light_at(
     w: float,
     rx: float,
@@ -83,7 +84,7 @@ def light_at(
     )
 
 
-@njit(nogil=True, cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@njit(nogil=True, cache=True, error_model="numpy", fastmath=True)  # type: ignore[untyped-decorator]
 def light_grid(
     grid: NDArray[np.float32],
     inverse: NDArray[np.float32],
@@ -103,7 +104,7 @@ def light_grid(
             grid[3, i, j], grid[4, i, j], grid[5, i, j] = shine[3], shine[4], shine[5]
 
 
-@njit(nogil=True, cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@njit(nogil=True, cache=True, error_model="numpy", fastmath=True)  # type: ignore[untyped-decorator]
 def light_ground(
     light: NDArray[np.float32],
     surface: NDArray[np.int32],
@@ -146,7 +147,7 @@ def light_ground(
                 left, right = j * LIGHT_PX, (j + 1) * LIGHT_PX
                 for u in range(left, min(width_px, right)):
                     w = inverse[v, u]
-                    best, x, y = np.inf, j, i
+                    best, x, y = 1e30, j, i
                     for k in range(4):
                         away = abs(inverse[high if k > 1 else low, right if k & 1 else left] - w)
                         if away < best:

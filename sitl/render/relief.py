@@ -1,4 +1,4 @@
-"""How far each pixel sees: rays marched against the surface on a coarse grid, finer where depths disagree."""
+"""A surface made ready for rays: how far one goes until it meets terrain, a crown or a roof."""
 
 import math
 from dataclasses import dataclass
@@ -10,20 +10,11 @@ from numpy.typing import NDArray
 
 from sitl.world.height_grid import HeightGrid
 
-COARSE_PX = 16
 _LEAF_M = 1.0
 _MOST_LEVELS = 7
 _FARTHEST_M = 1200.0  # beyond, the world is a plane
-# What part of the inverse depth two neighbours may disagree by, beyond what a smooth surface explains, before rays
-# are marched between them: the smallest for which a frame's rays suffice.
-_TOLERANCES = (0.02, 0.04, 0.08, 0.16, 0.32, 0.64, 0.9)
-_JUMP = 0.08
-_AROUND = 0.06  # of the depth: how far before and behind a thing's edge the thing may go on
-_NOTHING = -1e30
-_BUSY_M, _BUSY_FROM_M = 0.3, 250.0
-_MOST_FINE = 4000  # rays a frame may spend on each finer grid
+NOTHING = -1e30
 _NEAREST_M = 0.05
-_FINE_PX = 2.7  # smaller things may be rough
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -112,7 +103,7 @@ def height_at(up_m: NDArray[np.float32], place: NDArray[np.float64], north_m: fl
 
 
 @njit(nogil=True, cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
-def _fold(i: int, n: int) -> int:
+def fold(i: int, n: int) -> int:
     """Mirror a part's index into 0 to n - 1."""
     if 0 <= i < n:
         return i
@@ -142,7 +133,7 @@ def march(
 
     The first arguments are Relief's. The ray starts at (`north_m`, `east_m`, `height_m`) and goes (`dn`, `de`, `du`)
     for each metre of depth. Where it meets nothing within a kilometre, it meets the plane at `far_m`. Only depths
-    between `from_m` and `to_m` [m] are looked at; _NOTHING where the ray meets nothing there. What is smaller than the
+    between `from_m` and `to_m` [m] are looked at; NOTHING where the ray meets nothing there. What is smaller than the
     part `fine` of its depth may be taken for a box.
     """
     level_ground = -du / max(0.05, height_m - far_m)
@@ -176,7 +167,7 @@ def march(
         z_a, z_b = (((i + ahead_a) << level) - a0) * per_a, (((j + ahead_b) << level) - b0) * per_b
         out = min(end, max(min(z_a, z_b), z) + nudge)
         n_rows, n_columns = levels[level, 1], levels[level, 2]
-        tallest = highest_m[levels[level, 0] + _fold(i, n_rows) * n_columns + _fold(j, n_columns)]
+        tallest = highest_m[levels[level, 0] + fold(i, n_rows) * n_columns + fold(j, n_columns)]
         if height_m + (out if du < 0.0 else z) * du > tallest:
             z = out
             level = min(level + 1, top)
@@ -215,226 +206,7 @@ def march(
         z = out
         level = min(1, top)
     if is_part:
-        return _NOTHING
+        return NOTHING
     if end < farthest and du < 0.0:
         return 1.0 / max(_NEAREST_M, end)
     return min(level_ground, 1.0 / farthest)
-
-
-@njit(nogil=True, cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
-def _oddness(before: float, a: float, b: float, after: float) -> float:
-    """How much the step from a to b is larger than its neighbours, as a part of the larger inverse depth."""
-    step = b - a
-    low, high = min(a - before, after - b), max(a - before, after - b)
-    odd = max(0.0, step - high, low - step)
-    return odd / max(abs(a), abs(b), 5e-4)
-
-
-@njit(nogil=True, cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
-def _mark_odd(
-    inverse: NDArray[np.float32],
-    marched: NDArray[np.uint8],
-    odd: NDArray[np.float32],
-    is_edge: NDArray[np.uint8],
-    step: int,
-) -> float:
-    """Write how odd the depths round each square of `step` px are; from which oddness on the frame can afford rays."""
-    counts = np.zeros(len(_TOLERANCES), dtype=np.int64)
-    n_rows, n_columns = inverse.shape[0] - 1, inverse.shape[1] - 1
-    parents = ~(2 * step - 1)
-    i = -1
-    for v in range(0, n_rows, step):
-        up, down = max(0, v - step), min(n_rows, v + 2 * step)
-        v_parent = (v & parents) + step
-        i += 1
-        j = -1
-        for u in range(0, n_columns, step):
-            j += 1
-            here = np.float32(0.0)
-            # What was interpolated is smooth.
-            if step == COARSE_PX or marched[v_parent, (u & parents) + step]:
-                left, right = max(0, u - step), min(n_columns, u + 2 * step)
-                for k in range(2):
-                    x, y = u + k * step, v + k * step
-                    a, b = inverse[y, u], inverse[y, u + step]
-                    before = inverse[y, left] if left < u else 2 * a - b
-                    after = inverse[y, right] if right > u + step else 2 * b - a
-                    here = max(here, _oddness(before, a, b, after))
-                    a, b = inverse[v, x], inverse[v + step, x]
-                    before = inverse[up, x] if up < v else 2 * a - b
-                    after = inverse[down, x] if down > v + step else 2 * b - a
-                    here = max(here, _oddness(before, a, b, after))
-                for k in range(len(_TOLERANCES)):
-                    if here >= _TOLERANCES[k]:
-                        counts[k] += 1
-            odd[i, j] = here
-            if step == 4:
-                is_edge[i, j] = here >= _JUMP
-    if step == COARSE_PX:
-        return _TOLERANCES[0]
-    for k in range(len(_TOLERANCES)):
-        if 5 * counts[k] <= _MOST_FINE:
-            return _TOLERANCES[k] if counts[k] > 0 else np.inf
-    return np.inf
-
-
-@njit(nogil=True, cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
-def _mark_busy(
-    inverse: NDArray[np.float32],
-    odd: NDArray[np.float32],
-    rays: NDArray[np.float32],
-    highest_m: NDArray[np.float32],
-    levels: NDArray[np.int64],
-    leaf_m: NDArray[np.float64],
-    place: NDArray[np.float64],
-    centre: NDArray[np.float64],
-    r: NDArray[np.float64],
-) -> None:
-    """Mark the coarse squares between whose rays something may stand that none of them met.
-
-    That is where the surface round the rays' last tenth is higher than where they end.
-    """
-    top = levels.shape[0] - 1
-    for i in range((inverse.shape[0] - 1) // COARSE_PX):
-        for j in range((inverse.shape[1] - 1) // COARSE_PX):
-            if odd[i, j] >= 1.0:
-                continue
-            low_a = low_b = 1e9
-            high_a = high_b = -1e9
-            up_m, n_sky = -1e9, 0
-            for k in range(4):
-                v, u = (i + (k >> 1)) * COARSE_PX, (j + (k & 1)) * COARSE_PX
-                w = inverse[v, u]
-                if w <= 1.0 / _BUSY_FROM_M:
-                    n_sky += 1 if w <= 0.0 else 5
-                    continue
-                x, y = rays[0, v, u], rays[1, v, u]
-                a = (r[0, 0] * x + r[0, 1] * y + r[0, 2]) / w / leaf_m[0]
-                b = (r[1, 0] * x + r[1, 1] * y + r[1, 2]) / w / leaf_m[1]
-                up_m = max(up_m, -centre[2] - (r[2, 0] * x + r[2, 1] * y + r[2, 2]) / w)
-                low_a, high_a = min(low_a, a, 0.9 * a), max(high_a, a, 0.9 * a)
-                low_b, high_b = min(low_b, b, 0.9 * b), max(high_b, b, 0.9 * b)
-            if n_sky == 4:
-                continue
-            if n_sky > 0:
-                odd[i, j] = 1.0
-                continue
-            a0, b0 = (centre[0] - place[0]) / leaf_m[0], (centre[1] - place[1]) / leaf_m[1]
-            level, reach = 0, max(high_a - low_a, high_b - low_b)
-            while level < top and reach > 2.0:
-                reach *= 0.5
-                level += 1
-            n_rows, n_columns = levels[level, 1], levels[level, 2]
-            for y_part in range(math.floor(a0 + low_a) >> level, (math.floor(a0 + high_a) >> level) + 1):
-                for x_part in range(math.floor(b0 + low_b) >> level, (math.floor(b0 + high_b) >> level) + 1):
-                    part = _fold(y_part, n_rows) * n_columns + _fold(x_part, n_columns)
-                    if highest_m[levels[level, 0] + part] > up_m + _BUSY_M:
-                        odd[i, j] = 1.0
-
-
-@njit(nogil=True, cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
-def _halve(inverse: NDArray[np.float32], odd: NDArray[np.float32], step: int, is_flat: bool) -> None:
-    """Fill the nodes half-way between those `step` px apart: by the mean, or where depths jump by one neighbour."""
-    half = step // 2
-    n_rows, n_columns = inverse.shape[0] - 1, inverse.shape[1] - 1
-    part = np.float32(0.5)
-    for v in range(0, n_rows + 1, step):
-        for u in range(0, n_columns, step):
-            inverse[v, u + half] = part * (inverse[v, u] + inverse[v, u + step])
-    for v in range(0, n_rows, step):
-        for u in range(0, n_columns + 1, half):
-            inverse[v + half, u] = part * (inverse[v, u] + inverse[v + step, u])
-    if is_flat or step == COARSE_PX:
-        return
-    for i in range(n_rows // step):
-        for j in range(n_columns // step):
-            if odd[i, j] >= _JUMP:
-                v, u = i * step, j * step
-                inverse[v, u + half] = inverse[v + half, u] = inverse[v + half, u + half] = inverse[v, u]
-
-
-@njit(nogil=True, cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
-def find_inverse_depth(
-    inverse: NDArray[np.float32],
-    is_edge: NDArray[np.uint8],
-    marched: NDArray[np.uint8],
-    odd: NDArray[np.float32],
-    rays: NDArray[np.float32],
-    up_m: NDArray[np.float32],
-    highest_m: NDArray[np.float32],
-    levels: NDArray[np.int64],
-    leaf_m: NDArray[np.float64],
-    place: NDArray[np.float64],
-    far_m: float,
-    is_flat: bool,
-    centre: NDArray[np.float64],
-    ned_from_camera: NDArray[np.float64],
-    f_px: float,
-) -> None:
-    """Fill `inverse` (rows, columns) float32 with 1 / depth [1/m]; 0 or less is sky.
-
-    `inverse`, `marched` and `rays` (2, rows, columns) have a multiple of COARSE_PX rows and columns, and one more;
-    `odd` has room for one entry for each square of 2 px; `is_edge`, one for each square of 4 px, becomes 1 where depths
-    jump. The rest is Relief's and the camera's pose.
-    """
-    n_rows, n_columns = inverse.shape[0], inverse.shape[1]
-    r = ned_from_camera
-    north_m, east_m, height_m = centre[0], centre[1], -centre[2]
-    fine = _FINE_PX / f_px
-    is_edge[:, :] = 0
-    if is_flat:
-        per_height = 1.0 / max(0.01, height_m - place[3])
-        for v in range(0, n_rows, COARSE_PX):
-            for u in range(0, n_columns, COARSE_PX):
-                inverse[v, u] = (r[2, 0] * rays[0, v, u] + r[2, 1] * rays[1, v, u] + r[2, 2]) * per_height
-    else:
-        marched[:, :] = 0
-        for v in range(0, n_rows, COARSE_PX):
-            for u in range(0, n_columns, COARSE_PX):
-                x, y = rays[0, v, u], rays[1, v, u]
-                inverse[v, u] = march(
-                    up_m, highest_m, levels, leaf_m, place, far_m, north_m, east_m, height_m,
-                    r[0, 0] * x + r[0, 1] * y + r[0, 2], r[1, 0] * x + r[1, 1] * y + r[1, 2],
-                    -(r[2, 0] * x + r[2, 1] * y + r[2, 2]), 0.0, np.inf, fine,
-                )  # fmt: skip
-    step = COARSE_PX
-    is_uneven = not is_flat
-    while step > 1:
-        half = step // 2
-        threshold = np.inf
-        if is_uneven:
-            threshold = _mark_odd(inverse, marched, odd, is_edge, step)
-            if step == COARSE_PX:
-                _mark_busy(inverse, odd, rays, highest_m, levels, leaf_m, place, centre, r)
-        _halve(inverse, odd, step, not is_uneven)
-        is_uneven = threshold < np.inf
-        if is_uneven:
-            for i in range((n_rows - 1) // step):
-                for j in range((n_columns - 1) // step):
-                    if odd[i, j] < threshold:
-                        continue
-                    v, u = i * step, j * step
-                    corners = inverse[v, u], inverse[v, u + step], inverse[v + step, u], inverse[v + step, u + step]
-                    near, far = max(corners), min(corners)
-                    # Something near stands before something far: only what is near is looked for, and what it leaves
-                    # free is as far as at the corner.
-                    from_m = (1.0 - _AROUND) / max(near, 1e-6)
-                    to_m = (1.0 + _AROUND) / max(near, 1e-6)
-                    if far * (1.0 + 2.0 * _AROUND) > near:
-                        to_m = (1.0 + _AROUND) / far
-                    if step == COARSE_PX:
-                        from_m, to_m = 0.0, np.inf
-                    for k in range(5):
-                        vv = v + (half if k in (0, 1, 2) else (0 if k == 3 else step))
-                        uu = u + (half if k in (0, 3, 4) else (0 if k == 1 else step))
-                        if marched[vv, uu] == step:
-                            continue
-                        marched[vv, uu] = step
-                        x, y = rays[0, vv, uu], rays[1, vv, uu]
-                        found = march(
-                            up_m, highest_m, levels, leaf_m, place, far_m, north_m, east_m, height_m,
-                            r[0, 0] * x + r[0, 1] * y + r[0, 2], r[1, 0] * x + r[1, 1] * y + r[1, 2],
-                            -(r[2, 0] * x + r[2, 1] * y + r[2, 2]), from_m, to_m, fine,
-                        )  # fmt: skip
-                        inverse[vv, uu] = far if found == _NOTHING else found
-        step = half

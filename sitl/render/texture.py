@@ -104,7 +104,7 @@ def dither(width_px: int, height_px: int) -> NDArray[np.float32]:
     return np.asarray((52.9829189 * ((0.06711056 * u + 0.00583715 * v) % 1.0)) % 1.0, dtype=np.float32)
 
 
-@njit(nogil=True, cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
+@njit(nogil=True, cache=True, error_model="numpy", fastmath=True)  # type: ignore[untyped-decorator]
 def map_texture(
     columns: NDArray[np.float32],
     rows: NDArray[np.float32],

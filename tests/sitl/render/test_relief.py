@@ -8,9 +8,10 @@ import pytest
 
 from drivers.camera.camera import Intrinsics
 from sitl.pose import Pose
+from sitl.render.depth import find_inverse_depth
 from sitl.render.lens import CameraMount, camera_pose, lens_vector
 from sitl.render.projection import project_point
-from sitl.render.relief import Relief, find_inverse_depth, height_at, highest_leaves, march
+from sitl.render.relief import Relief, height_at, highest_leaves, march
 from sitl.render.renderer import Renderer
 from sitl.world.height_grid import HeightGrid
 from sitl.world.records import Building, Tree
