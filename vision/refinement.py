@@ -119,7 +119,7 @@ def _surest_run(beside: NDArray[np.float64], first: int, last: int) -> tuple[int
     `beside` (n, 3) holds the blocks' coherence in three columns. A line that ends in the frame, at a bend or a pole,
     leaves blocks of mere texture beyond its end: they are cut off where they have much less coherence than the rest.
     """
-    column, coherence = 0, -1.0
+    column, coherence = 0, 0.0
     for k in range(3):
         mean = beside[first : last + 1, k].mean()
         if mean > coherence:

@@ -3,7 +3,7 @@
 import math
 import statistics
 from collections import deque
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from mission.autopilot import Setpoint
 from mission.guidance import (
@@ -24,10 +24,20 @@ _SLOWEST = 0.25  # of r
 _STRAIGHT_RAD = math.radians(5.0)  # a turn that is left and takes no speed away
 _TURN_RAD = math.radians(25.0)  # and over which it does
 _PICK_UP_S = 1.5
-_SAME_RAD = math.radians(6.0)  # two sights of one span differ by less
+_SAME_RAD = math.radians(12.0)  # two sights of one span differ by less
+_IN_SIGHT_M = 12.0  # so far behind a bend, the span before it is out of sight
 _N_HEIGHTS = 15  # sights whose median is believed
 _CLIMB_M_S = 0.7
 _PASSED_M = 1.0  # so far behind the vehicle, a bend in view is still one to turn at
+
+
+@dataclass(frozen=True, slots=True)
+class _LeftSpan:
+    """The span before the last bend: its heading, and until which way flown [m] what runs so is taken for it."""
+
+    heading_rad: float
+    tolerance_rad: float
+    until_m: float
 
 
 class FollowLinesTask:
@@ -54,7 +64,7 @@ class FollowLinesTask:
         self._lowest_down_m: float | None = None
         self._pace = 1.0
         self._bend_m: float | None = None  # how far ahead of the setpoint the line bends
-        self._left: float | None = None  # the heading of the span before the last bend, while that is in sight
+        self._left: _LeftSpan | None = None
 
     @property
     def progress(self) -> float:
@@ -93,7 +103,7 @@ class FollowLinesTask:
                 self._line,
                 course_rad,
                 guidance.lateral_per_s,
-                guidance.lateral_max_m_s if self._left is None else guidance.r_m_s,
+                guidance.r_m_s if self._is_turning else guidance.lateral_max_m_s,
                 seen.dt_s,
                 beyond_m=guidance.lateral_lead * vehicle_off_m,
             )
@@ -114,6 +124,11 @@ class FollowLinesTask:
         down_m = min(seen.state.down_m - too_low_m, self._lowest_down_m)
         return step_vertical(setpoint, down_m, _CLIMB_M_S, seen.dt_s)
 
+    @property
+    def _is_turning(self) -> bool:
+        """Whether a bend has just been left behind."""
+        return self._left is not None and self._odometer.moved_m <= self._left.until_m
+
     def _see(self, reference: Setpoint, sight: Sight, line: WorldLine) -> None:
         """Choose between the spans in sight: on the one that is followed, until the setpoint is at the bend."""
         self._unseen_s = 0.0
@@ -123,22 +138,33 @@ class FollowLinesTask:
             self._take(line, reference.yaw_rad if self._target_rad is None else self._target_rad, sight)
             return
         target_rad = self._target_rad
-        spans = [line] if sight.next_line is None else [line, sight.next_line]
-        spans.sort(key=lambda span: abs(wrap_line_angle_rad(span.heading_rad - target_rad)))
-        if self._left is not None and abs(wrap_line_angle_rad(spans[0].heading_rad - self._left)) < _SAME_RAD:
+        spans = [span for span in (line, sight.next_line) if span is not None and not self._has_left(span)]
+        if not spans:
             return  # the vehicle is still over the span that the setpoint has left
-        self._left = None if len(spans) == 1 else self._left
+        spans.sort(key=lambda span: abs(wrap_line_angle_rad(span.heading_rad - target_rad)))
         self._take(spans[0], target_rad, sight)
         self._bend_m = None
-        if len(spans) == 1 or self._left is not None:
+        if len(spans) == 1:
             return
         from_vehicle_m = spans[1].crossing_m(sight.north_m, sight.east_m, target_rad)
         bend_m = spans[1].crossing_m(reference.north_m, reference.east_m, target_rad)
-        if bend_m is not None and from_vehicle_m is not None and from_vehicle_m > -_PASSED_M:
+        is_passed = spans[0] is not line  # the vehicle is over the other one already
+        if bend_m is not None and from_vehicle_m is not None and (is_passed or from_vehicle_m > -_PASSED_M):
             self._bend_m = bend_m
-            if bend_m <= 0.0:
-                self._left = spans[0].heading_rad
+            if bend_m <= 0.0 or is_passed:
+                self._leave(spans[0], spans[1])
                 self._take(spans[1], target_rad, sight)
+
+    def _leave(self, span: WorldLine, beyond: WorldLine) -> None:
+        """From here on `span` is not looked at any more, as long as its end may be in sight."""
+        turn_rad = abs(wrap_line_angle_rad(beyond.heading_rad - span.heading_rad))
+        self._left = _LeftSpan(span.heading_rad, min(_SAME_RAD, turn_rad / 2), self._odometer.moved_m + _IN_SIGHT_M)
+
+    def _has_left(self, span: WorldLine) -> bool:
+        left = self._left
+        if left is None or self._odometer.moved_m > left.until_m:
+            return False
+        return abs(wrap_line_angle_rad(span.heading_rad - left.heading_rad)) < left.tolerance_rad
 
     def _take(self, line: WorldLine, heading_rad: float, sight: Sight) -> None:
         self._target_rad = nearest_heading_rad(line.heading_rad, heading_rad)
