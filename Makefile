@@ -6,7 +6,7 @@ MISSION ?= missions/follow_line.yaml
 FLY ?= --speed 1.5
 PYTEST ?=
 
-.PHONY: fly test test-v4l2 check bench bench-vision bench-jitter bench-soak schema diagram safety-table clean clean-v4l2
+.PHONY: fly test test-v4l2 check bench bench-vision bench-jitter bench-soak bench-following schema diagram safety-table clean clean-v4l2
 
 fly: $(VENV)/.installed
 	$(BIN)/lineflight dry-run $(MISSION) $(FLY)
@@ -36,6 +36,9 @@ bench-jitter: $(VENV)/.installed-dev
 
 bench-soak: $(VENV)/.installed-dev
 	$(BIN)/python -m benchmarks.soak
+
+bench-following: $(VENV)/.installed-dev
+	$(BIN)/python -m benchmarks.following
 
 schema: $(VENV)/.installed
 	$(BIN)/python -c "from mission.plan_file import schema_text; print(schema_text(), end='')" > missions/mission.schema.json

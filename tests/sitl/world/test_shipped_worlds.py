@@ -132,10 +132,12 @@ def test_the_default_line_is_where_it_always_was() -> None:
     assert highest == pytest.approx(-10.2)
 
 
-def test_high_voltage_has_tall_towers_and_a_shield_wire() -> None:
+def test_high_voltage_has_tall_towers_and_twin_bundles() -> None:
     line = WORLDS["high_voltage"].line
     assert all(support.kind == "lattice_tower" and len(support.members) >= 100 for support in line.supports)
-    assert sum(conductor.is_shield for conductor in line.conductors) == 1
+    middles = [conductor.points_ned_m[len(conductor.points_ned_m) // 2] for conductor in line.conductors]
+    nearest_m = [min(float(np.linalg.norm(a - b)) for b in middles if b is not a) for a in middles]
+    assert nearest_m == pytest.approx([0.4] * 6, abs=0.02)
 
 
 def test_the_forest_leaves_a_corridor() -> None:
