@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-_KEPT = 10  # files of up to 300 MB; the ones not used for longest go first
+_MOST_BYTES = 4_000_000_000  # a ground is up to 300 MB; what was not used for longest goes first
 
 
 def cache_folder() -> Path:
@@ -54,6 +54,9 @@ def _keep(file: Path, painted: NDArray[np.uint8]) -> None:
     except BaseException:
         Path(name).unlink(missing_ok=True)
         raise
-    kept = sorted(file.parent.glob("*.npy"), key=lambda path: path.stat().st_mtime)
-    for old in kept[:-_KEPT]:
-        old.unlink(missing_ok=True)
+    room_bytes = _MOST_BYTES
+    kept = [(path.stat(), path) for path in file.parent.glob("*.npy")]
+    for facts, path in sorted(kept, key=lambda entry: entry[0].st_mtime, reverse=True):
+        room_bytes -= facts.st_size
+        if room_bytes < 0 and path != file:
+            path.unlink(missing_ok=True)

@@ -75,7 +75,7 @@ def test_a_folder_that_cannot_be_written_is_no_error(
 
 
 def test_what_was_not_used_for_longest_goes(painter: Painter, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(cache, "_KEPT", 2)
+    monkeypatch.setattr(cache, "_MOST_BYTES", 2 * (PICTURE.nbytes + 128))  # two files, with NumPy's headers
     for age, key in enumerate("abc"):
         recall(key, PICTURE.shape, painter)
         file = cache_folder() / f"{key}.npy"
