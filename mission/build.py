@@ -9,6 +9,7 @@ from mission import plan as p
 from mission.geofence import Fence
 from mission.guidance import GuidanceSettings
 from mission.hazards import SafetyLimits
+from mission.known_line import MAX_TURN_RAD
 from mission.limits import SetpointLimits
 from mission.safety import Hazard, Reaction
 from mission.tasks.align import AlignTask
@@ -23,6 +24,7 @@ from mission.tasks.search_line import SearchSettings
 from mission.tasks.takeoff import TakeoffTask
 from mission.tasks.task import Command, FlightMemory, Task
 from vision.pipeline import VisionSettings
+from vision.records import wrap_line_angle_rad
 
 
 def guidance_settings(plan: p.GuidancePlan) -> GuidanceSettings:
@@ -106,7 +108,10 @@ def build_task(plan: p.AnyTask, guidance: GuidanceSettings, memory: FlightMemory
         case p.Ascend() | p.Descend():
             return ChangeAltitudeTask(plan.altitude_m, guidance, memory)
         case p.Rotate():
-            return RotateTask(math.radians(plan.angle_deg), guidance)
+            angle_rad = math.radians(plan.angle_deg)
+            if abs(wrap_line_angle_rad(angle_rad)) > MAX_TURN_RAD:
+                memory.known_line.forget()  # it may be followed by another line's task
+            return RotateTask(angle_rad, guidance)
         case p.MoveForward():
             distance_m = None if plan.distance_m == "as_move_until" else float(plan.distance_m)
             return MoveForwardTask(distance_m, guidance, memory)

@@ -148,7 +148,9 @@ def sight_of(
     estimate = report.estimate
     if estimate is not None:
         is_whole = group.is_whole(estimate.n_lines)
-        height_m = height_over_m(estimate, camera, guidance.conductor_spacing_m) if is_whole else None
+        height_m = None
+        if is_whole:
+            height_m = height_over_m(estimate, camera, guidance.conductor_spacing_m, guidance.height_over_line_m)
         line = locate_line(estimate, state, camera, height_m or guidance.height_over_line_m)
         if estimate.next_span is not None:
             span = estimate.next_span
@@ -213,9 +215,12 @@ class Lookout:
         """Take the line out of a sight that shows another one than is known; else know it better."""
         if sight.line is None or sight.estimate is None or known.line is None:
             return sight
-        now_s = sight.t_capture_ns / NS_PER_S
-        if not known.is_it(sight.line, sight.north_m, sight.east_m, now_s, is_whole=sight.is_whole):
-            return replace(sight, estimate=None, line=None, next_line=None, is_whole=False)
+        now_s, north_m, east_m, span = sight.t_capture_ns / NS_PER_S, sight.north_m, sight.east_m, sight.next_line
+        is_here = known.is_it(sight.line, north_m, east_m, now_s, is_whole=sight.is_whole)
+        if not is_here and span is not None and known.is_it(span, north_m, east_m, now_s, is_whole=sight.is_whole):
+            return replace(sight, line=span, next_line=None, height_m=None)
+        if not is_here:
+            return replace(sight, estimate=None, line=None, next_line=None, height_m=None, is_whole=False)
         if sight.is_whole:
             known.follow(sight.line, now_s)
             known.measure(sight.estimate, self._guidance.height_over_line_m / self._camera.fx_px)

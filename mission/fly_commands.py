@@ -58,6 +58,8 @@ def dry_run(
     from mission.simulated.scenario import Scenario
     from mission.simulated.simulation import WorldError, world_path_or_name
 
+    if virtual_time and speed != 1.0:
+        fail("--virtual-time goes as fast as it can: leave out --speed.", EXIT_BAD_INPUT)
     scenario = Scenario(world_path_or_name(world), light, seed, wind, _radians(wind_from), gust_fronts, airframe)
     try:
         if virtual_time:

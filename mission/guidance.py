@@ -76,20 +76,31 @@ class WorldLine:
         meeting_east_m = self.east_m + along_m * math.sin(self.heading_rad)
         return math.hypot(meeting_north_m - north_m, meeting_east_m - east_m)
 
-    def crossing_m(self, north_m: float, east_m: float, heading_rad: float) -> float | None:
-        """How far ahead a ray from the point along `heading_rad` crosses the line [m]; None within 20 degrees of it."""
+    def crossing_m(
+        self, north_m: float, east_m: float, heading_rad: float, least_rad: float = math.radians(20.0)
+    ) -> float | None:
+        """How far ahead a ray from the point along `heading_rad` crosses the line [m].
+
+        None where it runs along it, within `least_rad`.
+        """
         sine = math.sin(self.heading_rad - heading_rad)
-        if abs(sine) < math.sin(math.radians(20.0)):
+        if abs(sine) < math.sin(least_rad):
             return None
         d_north_m, d_east_m = self.north_m - north_m, self.east_m - east_m
         return (d_north_m * math.sin(self.heading_rad) - d_east_m * math.cos(self.heading_rad)) / sine
 
 
-def height_over_m(estimate: LineEstimate, camera: Intrinsics, spacing_m: float | None) -> float | None:
-    """The height over conductors that lie `spacing_m` apart [m]; None where it cannot be told from this estimate."""
+def height_over_m(
+    estimate: LineEstimate, camera: Intrinsics, spacing_m: float | None, planned_m: float
+) -> float | None:
+    """The height over conductors that lie `spacing_m` apart [m]; None where it cannot be told from this estimate.
+
+    What is not within half and twice the `planned_m` height is a spacing of other things.
+    """
     if spacing_m is None or estimate.spacing_px is None or estimate.spacing_px < 1.0:
         return None
-    return spacing_m * camera.fx_px / estimate.spacing_px
+    height_m = spacing_m * camera.fx_px / estimate.spacing_px
+    return height_m if 0.5 * planned_m <= height_m <= 2.0 * planned_m else None
 
 
 def locate_line(

@@ -16,7 +16,7 @@ _MOST_M = 4.0
 _STRAIGHT_RAD = 0.21  # 12 degrees: less may be a wrong angle
 _AWAY_M = 6.0  # how far from the vehicle a bend may be, seen or flown past
 _MOST_AWAY_M = 12.0
-_MAX_TURN_RAD = 1.2  # 69 degrees: angle supports turn by 60
+MAX_TURN_RAD = 1.2  # 69 degrees: angle supports turn by 60
 
 
 @dataclass(slots=True)
@@ -53,7 +53,7 @@ class KnownLine:
             return True
         heading_rad = self.line.heading_rad
         turn_rad = abs(wrap_line_angle_rad(line.heading_rad - heading_rad))
-        if turn_rad > _MAX_TURN_RAD:
+        if turn_rad > MAX_TURN_RAD:
             return False
         drift_m = _DRIFT_M_S * max(0.0, now_s - self.seen_s)
         part_m = 0.0 if is_whole else self.half_width_m

@@ -134,6 +134,7 @@ def find_resumption(
     heights_m = [getattr(task, "altitude_m", 0.0) for task in plan.tasks]
     line_m = plan.safety.line_height_m
     clear_m = 0.0 if line_m is None else line_m + plan.safety.min_clearance_m
+    planned_m = _planned_height_m(plan, index, place.height_m)
     resumption = Resumption(
         standing,
         place,
@@ -141,8 +142,8 @@ def find_resumption(
         begin.origin,
         begin.theta_0_rad,
         begin.vehicle_uid,
-        height_m=_planned_height_m(plan, index, place.height_m),
-        transit_height_m=min(max(*heights_m, clear_m), plan.safety.max_altitude_m - 1.0),
+        height_m=planned_m,
+        transit_height_m=min(max(*heights_m, clear_m, planned_m), plan.safety.max_altitude_m - 1.0),
     )
     return plan.model_copy(update={"tasks": tasks}), resumption
 
@@ -166,6 +167,8 @@ def _planned_height_m(plan: p.MissionPlan, index: int, height_m: float) -> float
             return max(goal_m, height_m)
         case p.Return() | p.Land():
             return max(before_m, height_m)
+        case p.FollowLines() if plan.guidance.conductor_spacing_m is not None:
+            return max(before_m, height_m)  # it climbs with the conductors
         case _:
             return before_m
 

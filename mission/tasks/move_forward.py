@@ -17,6 +17,7 @@ class MoveForwardTask:
         self._guidance = guidance
         self._memory = memory
         self._odometer = Odometer()
+        memory.known_line.forget()  # whatever line is seen there, it may be another one
 
     @property
     def progress(self) -> float:

@@ -8,6 +8,9 @@ from mission.parallax import Parallax
 from mission.tasks.odometer import NEARLY_M, Odometer
 from mission.tasks.task import FlightMemory, Observation, Sight, Step, is_there
 
+_ABOVE_GROUND = 0.75
+"""Share of the height over the take-off point: what seems to be further below than that lies on the ground."""
+
 
 class MoveUntilTask:
     """Flies along theta_0 until n frames in a row show the line.
@@ -112,10 +115,9 @@ class MoveUntilTask:
         if seen_m is None:
             return False
         way_m = sight.north_m * math.cos(heading_rad) + sight.east_m * math.sin(heading_rad)
+        if sight.height_m is not None:  # the line was put on the map by the height that was seen
+            seen_m *= self._guidance.height_over_line_m / sight.height_m
         self._parallax.add(way_m, seen_m, 0 if sight.estimate is None else sight.estimate.n_lines)
         height_m = self._parallax.height_m
-        if height_m is None:
-            return True
-        altitude_m = self._memory.start.down_m - sight.down_m
-        self._is_sure = height_m < math.sqrt(self._guidance.height_over_line_m * max(altitude_m, 0.1))
-        return self._is_sure
+        self._is_sure = height_m is not None and height_m < _ABOVE_GROUND * (self._memory.start.down_m - sight.down_m)
+        return self._is_sure or height_m is None

@@ -77,7 +77,7 @@ class SearchLineTask:
 
     def _waypoints(self, here: Setpoint) -> list[Setpoint]:
         high = replace(here, down_m=here.down_m - self._climb_m)
-        way = [replace(place, down_m=high.down_m, yaw_rad=here.yaw_rad) for place in self._way_back]
+        way = [replace(place, down_m=min(high.down_m, place.down_m), yaw_rad=here.yaw_rad) for place in self._way_back]
         last = way[-1] if way else high
         return [high, *self._sweep(high), *way, *self._sweep(last)]
 
