@@ -85,7 +85,9 @@ def conductor_pieces(grey: NDArray[np.float64], labels: Image) -> Iterable[tuple
     """Width [px], contrast [grey levels] and contrast in standard deviations of the ground, piece by piece."""
     kernel = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (BOTH_EDGES_PX, BOTH_EDGES_PX))
     framed = cv2.copyMakeBorder(labels, *(BOTH_EDGES_PX,) * 4, cv2.BORDER_CONSTANT, value=0)
-    whole = cv2.morphologyEx(framed, cv2.MORPH_CLOSE, kernel)[BOTH_EDGES_PX:-BOTH_EDGES_PX, BOTH_EDGES_PX:-BOTH_EDGES_PX]
+    whole = cv2.morphologyEx(framed, cv2.MORPH_CLOSE, kernel)[
+        BOTH_EDGES_PX:-BOTH_EDGES_PX, BOTH_EDGES_PX:-BOTH_EDGES_PX
+    ]
     n_parts, parts = cv2.connectedComponents((whole > 0).astype(np.uint8))
     for part in range(1, n_parts):
         y, x = np.nonzero(parts == part)

@@ -41,7 +41,7 @@ def sample_view(
     above_wires_m: tuple[float, float] = _ABOVE_WIRES_M,
     beside_m: float | None = None,
 ) -> View:
-    """A view over the world's line, `above_wires_m` [m] from and to, along it one way or the other, tilted as in flight.
+    """A view over the world's line, `above_wires_m` [m] from and to, along it either way, tilted as in flight.
 
     `surface` is surface_of(world); `beside_m` the standard deviation across the line [m], else the camera's own.
     """
