@@ -45,9 +45,8 @@ line, in the village the strip of longer grass under a fence, there and over the
 road, in the fields the rows of crops, where they stand out more than the conductors and then take the whole frame.
 Photographs have all of these; those of PLD seldom along the line. What is missed: the conductors of a second line that
 crosses, because only one direction is kept; the bundle on the other side of the frame where the nearer one stands out
-three times as much, because the conductors of one line are taken to look alike;
-in the village a conductor right over the edge of the grass
-under a fence. Thin conductors are not what is missed. In flight a frame does not decide alone: what lies on the ground
+three times as much, because the conductors of one line are taken to look alike; in the village a conductor right over
+the edge of the grass under a fence. Thin conductors are not what is missed. In flight a frame does not decide alone: what lies on the ground
 is told by its parallax, and a line that jumps sideways is another one
 ([0014](decisions/0014-recognising-the-line.md)); [benchmarks-following.md](benchmarks-following.md) tells what is left.
 """
