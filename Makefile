@@ -31,6 +31,13 @@ bench: $(VENV)/.installed-dev
 bench-vision: $(VENV)/.installed-dev
 	$(BIN)/python -m benchmarks.vision $(if $(DATA),--data $(DATA))
 
+.PHONY: bench-rendered world-pictures
+bench-rendered: $(VENV)/.installed-dev
+	$(BIN)/python -m benchmarks.rendered_lines $(if $(DATA),--data $(DATA))
+
+world-pictures: $(VENV)/.installed
+	$(BIN)/python -m benchmarks.world_gallery
+
 bench-jitter: $(VENV)/.installed-dev
 	$(BIN)/python -m benchmarks.jitter
 

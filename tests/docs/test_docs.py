@@ -11,6 +11,7 @@ from mission.build import reactions
 from mission.plan import ParameterCheck, SafetyPlan
 from mission.preflight_checks import check_all
 from mission.safety import FIXED_REACTIONS, PRIORITY, Reaction
+from sitl.world.file import shipped_worlds
 from tests.docs.state_machine_page import PAGE, page
 from tests.mission.test_preflight_checks import FINE, PLAN
 
@@ -49,3 +50,12 @@ def test_the_preflight_page_names_every_check() -> None:
 
 def test_the_state_machine_is_drawn_from_the_code() -> None:
     assert PAGE.read_text(encoding="utf-8") == page(), "run make diagram"
+
+
+def test_the_page_on_worlds_shows_every_world_from_above_and_from_the_front() -> None:
+    shown = re.findall(r"\]\(images/worlds/(\w+)_(down|front)\.jpg\)", (ROOT / "docs/worlds.md").read_text())
+    assert {(world, camera) for world in shipped_worlds() for camera in ("down", "front")} <= set(shown)
+
+
+def test_the_pictures_of_worlds_are_small() -> None:
+    assert [file.name for file in ROOT.glob("docs/images/worlds/*") if file.stat().st_size >= 60_000] == []

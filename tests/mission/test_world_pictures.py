@@ -22,6 +22,7 @@ from mission.simulated.world_pictures import app
 from sitl.render.lens import ned_from_body, pinhole
 from sitl.render.truth.files import FARTHEST_M, depth_millimetres
 from sitl.render.truth.sampling import sample_view
+from sitl.world.extent import distances_m
 from sitl.world.file import WorldError, load_world
 from sitl.world.surface import surface_of
 from vision.records import Track, VisionReport
@@ -151,6 +152,16 @@ def test_views_are_over_the_line_and_upright() -> None:
         assert ned_from_body(pose)[2, 2] > math.cos(math.radians(30.0))
         assert np.linalg.norm(view.motion.velocity_ned_m_s) < 9.0
         assert view == sample_view(world, surface_of(world), "down", np.random.default_rng((1, index)))
+
+
+def test_views_may_be_asked_for_over_the_line_at_one_height() -> None:
+    world = load_world()
+    tops_m = [-support.top_ned_m[2] for support in world.supports]
+    for index in range(50):
+        rng = np.random.default_rng((2, index))
+        pose = sample_view(world, surface_of(world), "down", rng, (5.0, 5.0), 0.0).motion.pose
+        assert distances_m(np.array([[pose.north_m, pose.east_m]]), np.array(world.line.axis_ne_m))[0] < 1e-6
+        assert min(tops_m) - 1.0 < -pose.down_m - 5.0 < max(tops_m) + 1.0  # 1 m below: the sag
 
 
 def test_a_depth_file_is_in_millimetres_and_0_where_it_cannot_tell() -> None:

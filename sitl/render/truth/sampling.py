@@ -33,17 +33,24 @@ class View:
     yaw_rad: float
 
 
-def sample_view(world: World, surface: HeightGrid, camera: CameraName, rng: np.random.Generator) -> View:
-    """A view over the world's line: 4 to 15 m above its wires, along it one way or the other, tilted as in flight.
+def sample_view(
+    world: World,
+    surface: HeightGrid,
+    camera: CameraName,
+    rng: np.random.Generator,
+    above_wires_m: tuple[float, float] = _ABOVE_WIRES_M,
+    beside_m: float | None = None,
+) -> View:
+    """A view over the world's line, `above_wires_m` [m] from and to, along it either way, tilted as in flight.
 
-    `surface` is surface_of(world).
+    `surface` is surface_of(world); `beside_m` the standard deviation across the line [m], else the camera's own.
     """
     north_m, east_m, heading_rad = _place_on(world, rng)
-    beside_m = rng.normal(0.0, _BESIDE_M[camera])
+    beside_m = rng.normal(0.0, _BESIDE_M[camera] if beside_m is None else beside_m)
     north_m -= beside_m * math.sin(heading_rad)
     east_m += beside_m * math.cos(heading_rad)
     over_all_m = surface.at(north_m, east_m) + _ABOVE_ALL_M
-    height_m = max(_wires_up_m(world, north_m, east_m) + rng.uniform(*_ABOVE_WIRES_M), over_all_m)
+    height_m = max(_wires_up_m(world, north_m, east_m) + rng.uniform(*above_wires_m), over_all_m)
     course_rad = heading_rad + (math.pi if rng.random() < 0.5 else 0.0)
     yaw_rad = math.remainder(course_rad + rng.normal(0.0, _YAW_RAD[camera]), 2.0 * math.pi)
     roll_rad, pitch_rad = np.clip(rng.normal(0.0, _TILT_RAD, 2), -_MOST_TILT_RAD, _MOST_TILT_RAD).tolist()
