@@ -30,7 +30,7 @@ class Surroundings:
 
     def __init__(self, watched: Watched) -> None:
         self._watched = watched
-        self._free_bytes = _free_bytes(watched.log_folder)
+        self._free_bytes = free_bytes(watched.log_folder)
         self._mission_change: str | None = None
 
     def view(self) -> ComputerView:
@@ -54,7 +54,7 @@ class Surroundings:
 
     def _look(self) -> None:
         watched = self._watched
-        self._free_bytes = _free_bytes(watched.log_folder)
+        self._free_bytes = free_bytes(watched.log_folder)
         try:
             is_same = sha256_of(watched.mission_path.read_bytes()) == watched.mission_sha256
         except OSError as error:
@@ -68,7 +68,8 @@ def sha256_of(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()
 
 
-def _free_bytes(folder: Path) -> int | None:
+def free_bytes(folder: Path) -> int | None:
+    """How much room a folder's disk has; None where that cannot be told."""
     try:
         return shutil.disk_usage(folder).free
     except OSError:

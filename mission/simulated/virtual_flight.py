@@ -30,6 +30,7 @@ from mission.simulated.rendered_eyes import RenderedEyes
 from mission.simulated.scenario import Scenario
 from mission.simulated.simulation import true_line
 from mission.simulated.virtual_time import VirtualClock, run_virtually
+from mission.surroundings import free_bytes
 from sitl.autopilot import SimAutopilot
 from sitl.outfit import outfit
 from sitl.render.photographer import Photographer
@@ -97,8 +98,9 @@ def fly_virtually(
                 camera,
                 recorder,
                 Logbook(NoJournal(), papers),
-                lambda: ComputerView(log_failure=recorder.failure),
+                lambda: ComputerView(free_disk_bytes=room_bytes, log_failure=recorder.failure),
             )
+            room_bytes = free_bytes(path.parent)
             executive = Executive(plan, crew, clock, None, on_checks)
             with stop_signals(executive.request_stop):
                 showing = asyncio.create_task(_show(executive, on_progress))
