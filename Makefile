@@ -6,7 +6,7 @@ MISSION ?= missions/follow_line.yaml
 FLY ?= --speed 1.5
 PYTEST ?=
 
-.PHONY: fly test test-v4l2 check bench bench-vision bench-jitter bench-soak bench-following schema diagram safety-table clean clean-v4l2
+.PHONY: fly test test-v4l2 check bench bench-vision bench-jitter bench-soak bench-following bench-rendered world-pictures schema diagram safety-table clean clean-v4l2
 
 fly: $(VENV)/.installed
 	$(BIN)/lineflight dry-run $(MISSION) $(FLY)
@@ -31,7 +31,6 @@ bench: $(VENV)/.installed-dev
 bench-vision: $(VENV)/.installed-dev
 	$(BIN)/python -m benchmarks.vision $(if $(DATA),--data $(DATA))
 
-.PHONY: bench-rendered world-pictures
 bench-rendered: $(VENV)/.installed-dev
 	$(BIN)/python -m benchmarks.rendered_lines $(if $(DATA),--data $(DATA))
 

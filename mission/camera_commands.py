@@ -1,20 +1,18 @@
 """`lineflight camera`: which cameras there are, what one gives, and its calibration."""
 
 import json
-import sys
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Literal, NoReturn
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import typer
+
+from mission.ending import EXIT_BAD_INPUT, EXIT_FAILED_FILE, fail
 
 if TYPE_CHECKING:
     from drivers.camera.camera import CameraSettings
     from mission.camera_show import Viewing
     from vision.pipeline import VisionSettings
-
-EXIT_FAILED_FILE = 1
-EXIT_BAD_INPUT = 2
 
 app = typer.Typer(help="List, look through and calibrate cameras.", no_args_is_help=True)
 
@@ -92,10 +90,10 @@ def show(
         if seen.last is not None and still is not None:
             has_line = write_still(still, seen.last, vision)
     except CameraError as error:
-        _fail(str(error), EXIT_BAD_INPUT)
+        fail(str(error), EXIT_BAD_INPUT)
     _print_viewing(spec, seen, has_line, as_json=as_json)
     if seen.last is None:
-        _fail(f"The camera {spec} gave no frame.", EXIT_FAILED_FILE)
+        fail(f"The camera {spec} gave no frame.", EXIT_FAILED_FILE)
 
 
 @app.command()
@@ -124,7 +122,7 @@ def calibrate(
         found, views = calibrate_from(board_photos(folder), sought, None if lens == "auto" else lens, tell)
         write_calibration(out, found.intrinsics, found.rms_px, f"{len(views)} photographs of a {sought}")
     except CameraError as error:
-        _fail(str(error), EXIT_BAD_INPUT)
+        fail(str(error), EXIT_BAD_INPUT)
     worst = max(zip(found.view_rms_px, views, strict=True), key=lambda pair: pair[0])
     camera = found.intrinsics
     typer.echo(f"{camera.lens} lens, {camera.width_px} x {camera.height_px} px")
@@ -154,7 +152,7 @@ def _settings(
         try:
             read = read_mission(mission)
         except MissionFileError as error:
-            _fail("\n".join(error.lines()), EXIT_BAD_INPUT)
+            fail("\n".join(error.lines()), EXIT_BAD_INPUT)
         settings, vision = camera_settings(read.plan.camera), vision_settings(read.plan, read.camera)
     if size is not None:
         width_px, height_px = _two_numbers(size, "--size", "640x480")
@@ -163,7 +161,7 @@ def _settings(
         settings = replace(settings, rate_hz=rate)
     if pixel_format is not None:
         if len(pixel_format) != 4 or not pixel_format.isascii():
-            _fail(f"--pixel-format is '{pixel_format}'; write four characters, as in YUYV or MJPG.", EXIT_BAD_INPUT)
+            fail(f"--pixel-format is '{pixel_format}'; write four characters, as in YUYV or MJPG.", EXIT_BAD_INPUT)
         settings = replace(settings, pixel_format=pixel_format)
     if controls:
         settings = replace(settings, controls=tuple(_control(text) for text in controls))
@@ -174,7 +172,7 @@ def _two_numbers(text: str, option: str, example: str) -> tuple[int, int]:
     first, _, second = text.lower().partition("x")
     numbers = [int(word) if word.isascii() and word.isdecimal() else 0 for word in (first, second)]
     if min(numbers) < 3 or max(numbers) > 20_000:
-        _fail(f"{option} is '{text}'; write two numbers from 3 on, as in {option} {example}.", EXIT_BAD_INPUT)
+        fail(f"{option} is '{text}'; write two numbers from 3 on, as in {option} {example}.", EXIT_BAD_INPUT)
     return numbers[0], numbers[1]
 
 
@@ -183,7 +181,7 @@ def _control(text: str) -> tuple[str, int]:
     try:
         return name, int(value)
     except ValueError:
-        _fail(f"--control is '{text}'; write a name and a number, as in --control auto_exposure=1.", EXIT_BAD_INPUT)
+        fail(f"--control is '{text}'; write a name and a number, as in --control auto_exposure=1.", EXIT_BAD_INPUT)
 
 
 def _print_controls(device: Path) -> None:
@@ -224,8 +222,3 @@ def _print_viewing(spec: str, seen: "Viewing", has_line: bool | None, *, as_json
     typer.echo(f"light {seen.level:.0f} of 255" + (f"; the frame is {seen.trouble}" if seen.trouble else ""))
     if has_line is not None:
         typer.echo("a power line is in view" if has_line else "no power line is in view")
-
-
-def _fail(message: str, code: int) -> NoReturn:
-    sys.stderr.write(message.rstrip() + "\n")
-    raise typer.Exit(code)

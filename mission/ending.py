@@ -37,6 +37,11 @@ def fail(message: str, code: int) -> NoReturn:
     raise typer.Exit(code)
 
 
+def refuse(message: str) -> NoReturn:
+    """Say in a sentence which input cannot be used, and end."""
+    fail(message, EXIT_BAD_INPUT)
+
+
 def read_mission(path: Path) -> "MissionFile":
     """Read a mission file, or end with what is wrong in it."""
     from mission.plan_file import MissionFileError, read_mission

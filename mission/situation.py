@@ -87,6 +87,8 @@ class Situation:
         self.was_armed = self.was_armed or state.is_armed
         if state.is_position_ok:
             self._position_ok_ns = now_ns
+        else:
+            self.memory.known_line.forget()  # the map on which it has its place may jump
         self._log.record(state)
         self._tracking = self._tracking_watch.tick(dt_s, state, helm.reference, is_offboard=helm.modes.is_offboard)
         self.memory.trail.add(state)

@@ -1,12 +1,13 @@
 """`lineflight world`: which worlds there are, what is in one, and one made from a map of power lines."""
 
-import sys
 from collections import Counter
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, NoReturn
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+from mission.ending import refuse
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -14,8 +15,6 @@ if TYPE_CHECKING:
     from sitl.world.line_models import LineModel
     from sitl.world.models import WorldModel
     from sitl.world.records import PowerLine, World
-
-EXIT_BAD_INPUT = 2
 
 app = typer.Typer(help="List and look at simulated worlds, and make them from maps.", no_args_is_help=True)
 
@@ -31,7 +30,7 @@ def list_worlds() -> None:
         try:
             description = read_world_file(name).description
         except WorldError as error:
-            _fail(str(error))
+            refuse(str(error))
         by_default = " (the default)" if name == DEFAULT_WORLD else ""
         typer.echo(f"{name:<{width}}  {description}{by_default}")
 
@@ -46,7 +45,7 @@ def show(world: Annotated[str, typer.Argument(help="A world's name or file.")]) 
     try:
         model, loaded = read_world_file(world), load_world(world)
     except WorldError as error:
-        _fail(str(error))
+        refuse(str(error))
     _print_world(model, loaded, Console())
 
 
@@ -67,17 +66,17 @@ def import_map(
     try:
         text = world_text(read_power_map(file), file, start_support, radius)
     except PowerMapError as error:
-        _fail(str(error))
+        refuse(str(error))
     if out.suffix not in (".yaml", ".yml"):
-        _fail(f"--out is '{out}'; name a file that ends in .yaml.")
+        refuse(f"--out is '{out}'; name a file that ends in .yaml.")
     try:
         out.write_text(text, encoding="utf-8")
     except OSError as error:
-        _fail(f"The world file {out} cannot be written: {error.strerror}.")
+        refuse(f"The world file {out} cannot be written: {error.strerror}.")
     try:
         loaded = load_world(str(out))
     except WorldError as error:
-        _fail(f"{error} It is kept for mending.")
+        refuse(f"{error} It is kept for mending.")
     lines = "1 line" if len(loaded.lines) == 1 else f"{len(loaded.lines)} lines"
     typer.echo(f"{out}: {lines} on {len(loaded.supports)} supports")
 
@@ -141,8 +140,3 @@ def _line_figures(world: "World", line: "PowerLine", of_file: "LineModel") -> tu
 def _range(values_m: list[float], digits: int) -> str:
     low, high = (f"{value:.{digits}f}" for value in (min(values_m), max(values_m)))
     return f"{low} m" if low == high else f"{low}-{high} m"
-
-
-def _fail(message: str) -> NoReturn:
-    sys.stderr.write(message.rstrip() + "\n")
-    raise typer.Exit(EXIT_BAD_INPUT)

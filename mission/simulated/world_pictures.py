@@ -3,11 +3,11 @@
 import math
 import sys
 from pathlib import Path
-from typing import Annotated, Literal, NoReturn
+from typing import Annotated, Literal
 
 import typer
 
-EXIT_BAD_INPUT = 2
+from mission.ending import refuse
 
 app = typer.Typer(help="Take pictures of simulated worlds.", no_args_is_help=True)
 
@@ -38,7 +38,7 @@ def render(
     width_px, height_px = _size(size)
     numbers = _pose(pose)
     if out.suffix.lower() != ".png":
-        _fail(f"--out is '{out}'; name a file that ends in .png.")
+        refuse(f"--out is '{out}'; name a file that ends in .png.")
     from mission.simulated.pictures import PicturesError, picture_camera, render_picture, write_picture_files
     from mission.simulated.simulation import WorldError
 
@@ -46,7 +46,7 @@ def render(
         image, found = render_picture(world, light, numbers, camera, picture_camera(width_px, height_px, hfov))
         written = write_picture_files(out, image, found if truth else None)
     except (WorldError, PicturesError) as error:
-        _fail(str(error))
+        refuse(str(error))
     for file in written:
         typer.echo(file)
 
@@ -97,7 +97,7 @@ def dataset(
             task = progress.add_task("pictures", total=n)
             make_dataset(settings, lambda: progress.advance(task))
     except (WorldError, PicturesError) as error:
-        _fail(str(error))
+        refuse(str(error))
     typer.echo(f"{out}: {n} pictures")
 
 
@@ -119,7 +119,7 @@ def replay(
 
     file = log.with_suffix(".mp4") if out is None else out
     if file.suffix.lower() != ".mp4":
-        _fail(f"--out is '{file}'; name a file that ends in .mp4.")
+        refuse(f"--out is '{file}'; name a file that ends in .mp4.")
     try:
         flight = read_flight(log)
         from rich.console import Console
@@ -139,9 +139,9 @@ def replay(
                 lambda done, total: progress.update(task, completed=done, total=total),
             )
     except WorldError as error:
-        _fail(f"{error} Name the flight's with --world." if world is None else str(error))
+        refuse(f"{error} Name the flight's with --world." if world is None else str(error))
     except (LogError, PicturesError) as error:
-        _fail(str(error))
+        refuse(str(error))
     typer.echo(f"{file}: {n_frames} frames")
 
 
@@ -149,7 +149,7 @@ def _size(text: str) -> tuple[int, int]:
     first, _, second = text.lower().partition("x")
     numbers = [int(word) if word.isascii() and word.isdecimal() else 0 for word in (first, second)]
     if not 16 <= min(numbers) <= max(numbers) <= 8192:
-        _fail(f"--size is '{text}'; write two numbers from 16 to 8192, as in --size 640x480.")
+        refuse(f"--size is '{text}'; write two numbers from 16 to 8192, as in --size 640x480.")
     return numbers[0], numbers[1]
 
 
@@ -160,16 +160,11 @@ def _pose(text: str) -> list[float]:
     except ValueError:
         numbers = []
     if len(numbers) not in (4, 6) or not all(math.isfinite(number) and abs(number) < 1e6 for number in numbers):
-        _fail(
+        refuse(
             f"--pose is '{text}'; write north, east and down in m and yaw in degrees, and pitch and roll if they are "
             "not 0, as in --pose 11,4,-16,110."
         )
     return [*numbers, 0.0, 0.0][:6]
-
-
-def _fail(message: str) -> NoReturn:
-    sys.stderr.write(message.rstrip() + "\n")
-    raise typer.Exit(EXIT_BAD_INPUT)
 
 
 if __name__ == "__main__":
