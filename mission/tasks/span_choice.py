@@ -11,7 +11,7 @@ _PASSED_M = 1.0  # so far behind the vehicle, a bend in view is still one to tur
 _SAME_RAD = 0.2  # two sights of one span differ by less
 _SAME_BEND_M = 2.0
 _LEAST_TURN_RAD = 0.1
-_N_SIGHTS = 3  # of one bend, before it is turned at
+_N_SIGHTS = 2  # of one bend, before it is turned at
 _IN_SIGHT_M = 12.0  # so far behind a bend, the span before it is out of sight
 _DOUBT_S = 1.5  # when nothing but the span before the bend has been seen for so long, there was none
 
