@@ -11,7 +11,6 @@ import math
 import multiprocessing
 import os
 import tempfile
-import time
 from collections.abc import Callable, Iterable
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -74,7 +73,7 @@ class Case:
 class Flown:
     """What came of a case; distances [m] are horizontal and to the true axis of the line, while following it.
 
-    `held` is the share of its frames that showed the line; `found_again_s` the longest time [s] that it was out of
+    `held` is the share of its frames that showed a line; `found_again_s` the longest time [s] that none was in
     sight; `wrong_m` how far off the line the vehicle was for WRONG_S and more, 0 below WRONG_M; clearances are from the
     vehicle's centre.
     """
@@ -220,7 +219,7 @@ COLUMNS = (
     "completed, on the line (Wilson 95 %)",
     "off the line, mean / p95 / max [m]",
     "heading error, median [deg]",
-    "frames with the line",
+    "frames with a line",
     "out of sight, longest [s]",
     "followed something else",
     "contacts",
@@ -236,8 +235,23 @@ def grouped(title: str, flights: list[Flown], key: Callable[[Flown], object]) ->
     return [*lines, *rows, ""]
 
 
-def page(flights: list[Flown], wall_s: float, processes: int) -> str:
-    """The whole page."""
+def kept(file: Path) -> list[Flown]:
+    """The flights that `--keep` has kept; of one case flown more than once the last."""
+    flights = {}
+    for line in file.read_text(encoding="utf-8").splitlines():
+        words = json.loads(line)
+        flown = Flown(**words | {"samples_m": tuple(words["samples_m"])})
+        flights[flown.command] = flown
+    return in_order(list(flights.values()))
+
+
+def in_order(flights: list[Flown]) -> list[Flown]:
+    """The flights as the page tells of them."""
+    return sorted(flights, key=lambda one: (list(MISSIONS).index(one.world), one.wind_m_s, one.light, one.seed))
+
+
+def page(flights: list[Flown], note: str) -> str:
+    """The whole page; `note` is a sentence about the run."""
     calm = [flown for flown in flights if flown.wind_m_s <= 8.0]
     failures = [flown for flown in flights if not flown.is_good]
     speed = float(np.median([flown.speed for flown in flights]))
@@ -247,8 +261,8 @@ def page(flights: list[Flown], wall_s: float, processes: int) -> str:
         "`make bench-following` regenerates this page. Each flight is a dry-run in virtual time with rendered frames "
         "and vision in the loop; wind is the mean at 20 ft with its Dryden gusts. All distances are to the simulated "
         f"truth, while aligning and following. A vehicle {WRONG_M:g} m off the line for {WRONG_S:g} s has followed "
-        f"something else. {len(flights)} flights in {wall_s / 60:.0f} min, {processes} at a time; {speed:.1f} times "
-        "real time each.",
+        f"something else; one that never got to align with the line has no distances. {len(flights)} flights, "
+        f"{speed:.1f} times real time each in the median, several at a time. {note}".rstrip(),
         "",
         *grouped("", calm, lambda flown: "all, up to 8 m/s"),
         "## By wind",
@@ -281,8 +295,14 @@ def main() -> None:
     parser.add_argument("--first-seed", type=int, default=1)
     parser.add_argument("--processes", type=int, default=max(1, len(os.sched_getaffinity(0))))
     parser.add_argument("--out", type=Path, default=PAGE)
-    parser.add_argument("--keep", type=Path, help="a file for the flights as JSON lines")
+    parser.add_argument("--keep", type=Path, help="a file that flights are added to, as JSON lines")
+    parser.add_argument("--page-of", type=Path, help="fly nothing; write the page of the flights in this file")
+    parser.add_argument("--note", default="", help="a sentence about this run for the page")
     options = parser.parse_args()
+    if options.page_of:
+        flights = kept(options.page_of)
+        options.out.write_text(page(flights, options.note), encoding="utf-8")
+        return
     cases = [
         Case(world, light, wind_m_s, seed)
         for seed in range(options.first_seed, options.first_seed + options.seeds)
@@ -291,7 +311,6 @@ def main() -> None:
         for world in options.worlds
     ]
     flights: list[Flown] = []
-    begin_s = time.monotonic()
     with multiprocessing.get_context("spawn").Pool(options.processes, maxtasksperchild=8) as pool:
         for flown in pool.imap_unordered(fly, cases):
             flights.append(flown)
@@ -302,8 +321,7 @@ def main() -> None:
             words = "ok" if flown.is_good else f"{flown.result}: {flown.contact or flown.reason} {flown.wrong_m:.1f}"
             what = f"{flown.world} {flown.light} {flown.wind_m_s:g} m/s seed {flown.seed}"
             print(f"{len(flights)}/{len(cases)}  {what}  {lateral} m  {flown.speed:.1f}x  {words}", flush=True)
-            flights.sort(key=lambda one: (list(MISSIONS).index(one.world), one.wind_m_s, one.light, one.seed))
-            options.out.write_text(page(flights, time.monotonic() - begin_s, options.processes), encoding="utf-8")
+            options.out.write_text(page(in_order(flights), options.note), encoding="utf-8")
 
 
 if __name__ == "__main__":
