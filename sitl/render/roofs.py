@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from sitl.render.colour import stored
 from sitl.render.fields import rise
+from sitl.render.texel import blend
 from sitl.world.records import Building, Roof
 from sitl.world.surface import EAVES_SLOPE_M, building_row, bumps, lattice
 
@@ -66,21 +67,11 @@ def paint_houses(
                 if are_yards:
                     part = 0.9 * rise(_YARD_M, 0.5, outside + 3.5 * bumps(dn * 0.35 + 50.0 * salt, de * 0.35))
                     if part > 0.0:
-                        _lay(picture[i, j], part, palette, 6, 0.95 + 0.12 * lattice(i, j), 85.0)
+                        blend(picture[i, j], part, palette, 6, 0.95 + 0.12 * lattice(i, j), 85.0)
                 elif outside < 0.0:
                     _paint_roof(picture[i, j], int(houses[k, 8]), along, across, half_length, half_width, salt, palette)
                 elif outside < EAVES_SLOPE_M + 0.03:
                     _paint_wall(picture[i, j], along, across, half_length, half_width, outside, houses[k, 6], palette)
-
-
-@njit(nogil=True, cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
-def _lay(
-    texel: NDArray[np.uint8], part: float, palette: NDArray[np.float64], which: int, shade: float, cover: float
-) -> None:
-    for c in range(3):
-        value = texel[c] + part * (255.0 * palette[which, c] * shade - texel[c])
-        texel[c] = int(min(255.0, max(0.0, value + 0.5)))
-    texel[3] = int(texel[3] + part * (cover - texel[3]) + 0.5)
 
 
 @njit(nogil=True, cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
@@ -104,26 +95,26 @@ def _paint_roof(
         tile = math.floor(along / 0.3 + 0.5 * (row % 2))
         shade = 0.9 + 0.12 * lattice(int(tile), int(row) + int(1000 * salt)) + 0.12 * (weather - 0.75)
         shade *= 1.0 - 0.24 * rise(0.22, 0.0, 1.0 - part) + 0.05 * part
-        _lay(texel, 1.0, palette, which, shade, 12.0)
+        blend(texel, 1.0, palette, which, shade, 12.0)
         if abs(across) < 0.13:
-            _lay(texel, 1.0, palette, which, 1.08 + 0.05 * weather, 12.0)
+            blend(texel, 1.0, palette, which, 1.08 + 0.05 * weather, 12.0)
     elif kind == 1:
         seam = abs(along / 0.55 - math.floor(along / 0.55) - 0.5) * 0.55
         shade = 0.93 + 0.1 * (weather - 0.75) + 0.03 * lattice(math.floor(along / 0.55), int(1000 * salt))
         shade *= 1.0 - 0.2 * rise(0.24, 0.27, seam)
-        _lay(texel, 1.0, palette, 1, shade, 0.0)
+        blend(texel, 1.0, palette, 1, shade, 0.0)
         if abs(abs(across) % 2.6 - 1.3) < 0.03:
-            _lay(texel, 0.4, palette, 5, 1.0, 0.0)
+            blend(texel, 0.4, palette, 5, 1.0, 0.0)
         if abs(across) < 0.12:
-            _lay(texel, 1.0, palette, 7, 1.05, 0.0)
+            blend(texel, 1.0, palette, 7, 1.05, 0.0)
     else:
         shade = 0.95 + 0.14 * (weather - 0.75) + 0.06 * lattice(int(along * 20.0 + 999.0), int(across * 20.0 + 999.0))
         if abs(across / 1.05 - math.floor(across / 1.05) - 0.5) > 0.465:
             shade *= 0.86
-        _lay(texel, 1.0, palette, 2, shade, 40.0)
+        blend(texel, 1.0, palette, 2, shade, 40.0)
     rim = min(half_length - abs(along), half_width - abs(across))
     if rim < (0.22 if kind == 2 else 0.09):
-        _lay(texel, 1.0, palette, 7, 1.0 if kind != 0 else 0.75, 0.0)
+        blend(texel, 1.0, palette, 7, 1.0 if kind != 0 else 0.75, 0.0)
 
 
 @njit(nogil=True, cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
@@ -141,7 +132,7 @@ def _paint_wall(
     height_m = eaves_m * (1.0 - outside / EAVES_SLOPE_M)
     is_end = abs(along) - half_length > abs(across) - half_width
     place = (across if is_end else along) / 2.8
-    _lay(texel, 1.0, palette, 4, 0.97, 8.0)
+    blend(texel, 1.0, palette, 4, 0.97, 8.0)
     storey = height_m % 2.7
     if 0.8 < storey < 2.2 and abs(place - math.floor(place) - 0.5) < 0.2 and height_m < eaves_m - 0.3:
-        _lay(texel, 1.0, palette, 5, 1.0, 0.0)
+        blend(texel, 1.0, palette, 5, 1.0, 0.0)

@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 
 from sitl.render.colour import stored
 from sitl.render.fields import rise
+from sitl.render.texel import blend
 from sitl.world.records import Strip, StripKind
 from sitl.world.surface import bumps, lattice
 
@@ -108,19 +109,6 @@ def paint_strips(
 
 
 @njit(nogil=True, cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
-def _blend(
-    texel: NDArray[np.uint8], part: float, palette: NDArray[np.float64], which: int, shade: float, cover: float
-) -> None:
-    """Lay a colour of the palette over a texel, `part` opaque."""
-    if part <= 0.0:
-        return
-    for c in range(3):
-        value = texel[c] + part * (255.0 * palette[which, c] * shade - texel[c])
-        texel[c] = int(min(255.0, max(0.0, value + 0.5)))
-    texel[3] = int(texel[3] + part * (cover - texel[3]) + 0.5)
-
-
-@njit(nogil=True, cache=True, error_model="numpy")  # type: ignore[untyped-decorator]
 def _paint_place(
     texel: NDArray[np.uint8],
     kind: int,
@@ -138,39 +126,39 @@ def _paint_place(
     if kind == 0:
         patch = bumps(along * 0.08, side * 0.35 + 9.0)
         wheel = rise(0.55, 0.15, abs(abs(side) - 0.5 * half) - 0.2)
-        _blend(texel, rise(half + 0.75, half + 0.15, away + 0.15 * grain), palette, 1, 1.0 + 0.05 * grain, 85.0)
+        blend(texel, rise(half + 0.75, half + 0.15, away + 0.15 * grain), palette, 1, 1.0 + 0.05 * grain, 85.0)
         shade = 0.93 + 0.1 * patch + 0.045 * wheel + 0.02 * grain + 0.015 * grain2
         joint = abs((along + 40.0 * patch) % 37.0 - 5.0)
         if patch > 0.62 and joint < 0.04:
             shade *= 0.8  # a sealed crack across
-        _blend(texel, rise(half + 0.05, half - 0.03, away + 0.03 * grain), palette, 0, shade, 45.0)
+        blend(texel, rise(half + 0.05, half - 0.03, away + 0.03 * grain), palette, 0, shade, 45.0)
     elif kind == 1:
         track = min(0.8, 0.5 * half)
         rut = 0.95 * rise(0.46, 0.14, abs(away - track) + 0.05 * grain + 0.03 * grain2)
         worn = 0.5 * rise(half + 0.5, 0.5 * half, away + 0.3 * grain)
-        _blend(texel, worn, palette, 1, 1.0 + 0.08 * grain, 140.0)
-        _blend(texel, rut, palette, 2, 0.97 + 0.05 * grain2, 85.0)
+        blend(texel, worn, palette, 1, 1.0 + 0.08 * grain, 140.0)
+        blend(texel, rut, palette, 2, 0.97 + 0.05 * grain2, 85.0)
     elif kind == 2:
         stone = lattice(math.floor(north_m * 17.0), math.floor(east_m * 17.0))
         bed = rise(half + 0.2, half - 0.25, away + 0.15 * grain)
-        _blend(texel, rise(half + 1.2, half, away + 0.3 * grain), palette, 7, 0.95 + 0.1 * grain, 170.0)
-        _blend(texel, bed, palette, 3, 0.78 + 0.3 * stone + 0.05 * grain - 0.08 * rise(1.0, 0.4, away), 85.0)
+        blend(texel, rise(half + 1.2, half, away + 0.3 * grain), palette, 7, 0.95 + 0.1 * grain, 170.0)
+        blend(texel, bed, palette, 3, 0.78 + 0.3 * stone + 0.05 * grain - 0.08 * rise(1.0, 0.4, away), 85.0)
         place = along % 0.6
         if away < 1.3 and place < 0.26:
             worn = 0.9 + 0.14 * lattice(int(along / 0.6), 7) + 0.03 * grain2
-            _blend(texel, 0.92, palette, 4, worn, 30.0)
+            blend(texel, 0.92, palette, 4, worn, 30.0)
     elif kind == 3:
         bank = half + 0.8 * (bumps(along * 0.12, 3.0 if side > 0.0 else 11.0) - 0.5) + 0.25 * grain2
-        _blend(texel, rise(bank + 1.8, bank + 0.4, away), palette, 7, 1.0 + 0.1 * grain, 170.0)
-        _blend(texel, rise(bank + 0.5, bank + 0.1, away), palette, 6, 0.9 + 0.08 * grain, 85.0)
+        blend(texel, rise(bank + 1.8, bank + 0.4, away), palette, 7, 1.0 + 0.1 * grain, 170.0)
+        blend(texel, rise(bank + 0.5, bank + 0.1, away), palette, 6, 0.9 + 0.08 * grain, 85.0)
         ripple = bumps(along * 1.1 + 0.6 * side, side * 2.6) - 0.5
         depth = rise(0.0, half, bank - away)
         shade = 1.15 - 0.3 * depth + 0.12 * ripple * depth
-        _blend(texel, rise(bank + 0.15, bank - 0.25, away), palette, 5, shade, 6.0)
+        blend(texel, rise(bank + 0.15, bank - 0.25, away), palette, 5, shade, 6.0)
     elif kind == 4:
-        _blend(texel, 0.75 * rise(0.55, 0.1, away + 0.12 * grain), palette, 7, 0.9 + 0.1 * grain2, 190.0)
+        blend(texel, 0.75 * rise(0.55, 0.1, away + 0.12 * grain), palette, 7, 0.9 + 0.1 * grain2, 190.0)
     else:
-        _blend(texel, 0.8 * rise(half + 0.7, half, away + 0.2 * grain), palette, 7, 0.9 + 0.1 * grain, 190.0)
+        blend(texel, 0.8 * rise(half + 0.7, half, away + 0.2 * grain), palette, 7, 0.9 + 0.1 * grain, 190.0)
         leaf = bumps(north_m * 4.0, east_m * 4.0) - 0.5
         part = rise(1.02, 0.95, away / half / (0.8 + 0.3 * bumps(north_m * 1.3, east_m * 1.3)))
-        _blend(texel, part, palette, 8, 1.0 + 0.5 * leaf + 0.08 * grain, 255.0)
+        blend(texel, part, palette, 8, 1.0 + 0.5 * leaf + 0.08 * grain, 255.0)
