@@ -8,11 +8,11 @@ from typing import Annotated, Literal
 import typer
 
 from mission.ending import refuse
+from mission.fly_commands import LightName
 
 app = typer.Typer(help="Take pictures of simulated worlds.", no_args_is_help=True)
 
-# sitl.world.light.LightName and sitl.render.truth.sampling.CameraName, without their import
-Light = Literal["noon", "low_sun", "overcast", "dusk"]
+# sitl.render.truth.sampling.CameraName, without its import
 CameraChoice = Literal["down", "front"]
 
 SizeOption = Annotated[str, typer.Option(help="WIDTHxHEIGHT in pixels.")]
@@ -30,7 +30,7 @@ def render(
     truth: Annotated[
         bool, typer.Option("--truth", help="Write _mask.png, _depth.png (mm), _lines.json and _boxes.json beside it.")
     ] = False,
-    light: Annotated[Light | None, typer.Option(help="Instead of the world's own.")] = None,
+    light: Annotated[LightName | None, typer.Option(help="Instead of the world's own.")] = None,
     size: SizeOption = "640x480",
     hfov: HfovOption = 80.0,
 ) -> None:
@@ -107,7 +107,7 @@ def replay(
     out: Annotated[Path | None, typer.Option(help="The video to write (.mp4); else beside the log.")] = None,
     camera: Annotated[Literal["down", "front", "both"], typer.Option(help="Which way to look.")] = "down",
     world: Annotated[str | None, typer.Option(help="A world's name or file; else the one that the log names.")] = None,
-    light: Annotated[Light | None, typer.Option(help="Instead of the flight's.")] = None,
+    light: Annotated[LightName | None, typer.Option(help="Instead of the flight's.")] = None,
     size: Annotated[str | None, typer.Option(help="WIDTHxHEIGHT in pixels; else as flown.")] = None,
 ) -> None:
     """Make a video of a flight: its poses rendered again, with the lines found, the task and a map."""
