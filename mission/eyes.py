@@ -1,18 +1,21 @@
 """What the executive asks of vision, and how a report is put on the map."""
 
+import math
 from collections import deque
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Protocol
 
 from drivers.camera.camera import Intrinsics
 from drivers.clock import NS_PER_S
 from mission.autopilot import VehicleState
-from mission.guidance import GuidanceSettings, height_over_m, locate_line, wrap_angle_rad
-from mission.known_line import KnownLine
+from mission.guidance import GuidanceSettings, bearing_of, wrap_angle_rad
+from mission.known_line import KnownLine, View
 from mission.records import Event, Severity
 from mission.reporting import FlightLog
 from mission.tasks.task import Sight
-from vision.records import BLINDING, VisionReport
+from vision.records import BLINDING, ImageLine, LineEstimate, VisionReport
+
+_IN_VIEW = 0.85  # share of the frame across the line: a conductor in its very corner is too short to be found
 
 
 @dataclass(frozen=True, slots=True)
@@ -77,24 +80,6 @@ class StateHistory:
         return later
 
 
-class GroupSize:
-    """How many conductors the line has, from what was counted lately.
-
-    A tilted camera may show a part of the group only; its middle is then not the line's. The size is the largest count
-    that a tenth of the last frames, and three at least, have shown: one wrong count does not make the line larger.
-    """
-
-    def __init__(self, window: int = 200) -> None:
-        self._counts: deque[int] = deque(maxlen=window)
-
-    def is_whole(self, n_lines: int) -> bool:
-        """Take one more count, and say whether it is the whole group as far as known."""
-        self._counts.append(n_lines)
-        enough = max(3, len(self._counts) // 10)
-        sizes = [size for size in set(self._counts) if self._counts.count(size) >= enough]
-        return n_lines >= max(sizes, default=0)
-
-
 def _interpolate(earlier: VehicleState, later: VehicleState, t_ns: int) -> VehicleState:
     share = (t_ns - earlier.t_ns) / (later.t_ns - earlier.t_ns)
 
@@ -128,14 +113,16 @@ def _interpolate(earlier: VehicleState, later: VehicleState, t_ns: int) -> Vehic
 def sight_of(
     report: VisionReport,
     history: StateHistory,
-    group: GroupSize,
+    known: KnownLine,
     camera: Intrinsics,
     guidance: GuidanceSettings,
+    ground_m: float,
     now_ns: int,
 ) -> Sight | None:
-    """What a report means on the map.
+    """What a report means on the map, by what is `known` of the line, which learns from it.
 
-    None when it is too old to steer, when nothing is known of that time, or when nothing can be seen in its frame.
+    None when it is too old to steer, when nothing is known of that time, or when nothing can be seen in its frame. A
+    line that cannot be the known one is none: it neither steers nor keeps the flight from missing its line.
 
     This is the one place where the age of an estimate is judged.
     """
@@ -144,29 +131,35 @@ def sight_of(
     state = history.at(report.t_capture_ns)
     if state is None:
         return None
-    line, next_line, height_m, is_whole = None, None, None, False
-    estimate = report.estimate
-    if estimate is not None:
-        is_whole = group.is_whole(estimate.n_lines)
-        height_m = None
-        if is_whole:
-            height_m = height_over_m(estimate, camera, guidance.conductor_spacing_m, guidance.height_over_line_m)
-        line = locate_line(estimate, state, camera, height_m or guidance.height_over_line_m)
-        if estimate.next_span is not None:
-            span = estimate.next_span
-            beyond = replace(estimate, angle_rad=span.angle_rad, offset_px=span.offset_px)
-            next_line = locate_line(beyond, state, camera, height_m or guidance.height_over_line_m)
-    return Sight(
-        report.t_capture_ns,
-        state.yaw_rad,
-        estimate,
-        line,
-        is_whole,
-        state.north_m,
-        state.east_m,
-        state.down_m,
-        next_line,
-        height_m,
+    view = None if report.estimate is None else view_of(report.estimate, state, camera, ground_m)
+    found = None if view is None else known.see(view, guidance)
+    return Sight(report.t_capture_ns, state.yaw_rad, state.north_m, state.east_m, state.down_m, found)
+
+
+def view_of(estimate: LineEstimate, state: VehicleState, camera: Intrinsics, ground_m: float) -> View | None:
+    """The estimate as seen from where the vehicle was, `ground_m` above the take-off point; None above the horizon."""
+    middle = bearing_of(estimate.middle, state, camera)
+    if middle is None:
+        return None
+    seen = (bearing_of(conductor, state, camera) for conductor in estimate.conductors or (estimate.middle,))
+    across_px = camera.width_px * abs(math.cos(estimate.angle_rad)) + camera.height_px * abs(
+        math.sin(estimate.angle_rad)
+    )
+    edges = [
+        bearing_of(ImageLine(estimate.angle_rad, side * 0.5 * _IN_VIEW * across_px), state, camera)
+        for side in (-1.0, 1.0)
+    ]
+    slopes = sorted(edge.along(middle.heading_rad).slope for edge in edges if edge is not None)
+    return View(
+        t_ns=estimate.t_capture_ns,
+        north_m=state.north_m,
+        east_m=state.east_m,
+        down_m=state.down_m,
+        ground_m=ground_m,
+        middle=middle,
+        conductors=tuple(bearing for bearing in seen if bearing is not None) or (middle,),
+        in_view=(slopes[0], slopes[-1]) if len(slopes) == 2 else (-math.inf, math.inf),
+        next_span=None if estimate.next_span is None else bearing_of(estimate.next_span, state, camera),
     )
 
 
@@ -182,7 +175,6 @@ class Lookout:
         self._camera = camera
         self._guidance = guidance
         self._history = StateHistory()
-        self._group = GroupSize()
         self.sight_ns = 0
         self.line_seen_ns = 0
 
@@ -191,10 +183,10 @@ class Lookout:
         self.sight_ns = max(self.sight_ns, now_ns)
         self.line_seen_ns = max(self.line_seen_ns, now_ns)
 
-    def look(self, now_ns: int, state: VehicleState, known: KnownLine) -> Sight | None:
+    def look(self, now_ns: int, state: VehicleState, known: KnownLine, ground_m: float) -> Sight | None:
         """The newest report since the last look, on the map; the older ones are kept in the log alone.
 
-        A line that cannot be the known one is none: it neither steers nor keeps the flight from missing its line.
+        The vehicle is `ground_m` above the take-off point.
         """
         self._history.add(state)
         self.keep_notices(now_ns)
@@ -203,27 +195,11 @@ class Lookout:
             self._log.record(report)
         if not reports:
             return None
-        sight = sight_of(reports[-1], self._history, self._group, self._camera, self._guidance, now_ns)
+        sight = sight_of(reports[-1], self._history, known, self._camera, self._guidance, ground_m, now_ns)
         if sight is not None:
-            sight = self._recognise(sight, known)
             self.sight_ns = max(self.sight_ns, sight.t_capture_ns)
-            if sight.line is not None:
+            if sight.found is not None:
                 self.line_seen_ns = max(self.line_seen_ns, sight.t_capture_ns)
-        return sight
-
-    def _recognise(self, sight: Sight, known: KnownLine) -> Sight:
-        """Take the line out of a sight that shows another one than is known; else know it better."""
-        if sight.line is None or sight.estimate is None or known.line is None:
-            return sight
-        now_s, north_m, east_m, span = sight.t_capture_ns / NS_PER_S, sight.north_m, sight.east_m, sight.next_line
-        is_here = known.is_it(sight.line, north_m, east_m, now_s, is_whole=sight.is_whole)
-        if not is_here and span is not None and known.is_it(span, north_m, east_m, now_s, is_whole=sight.is_whole):
-            return replace(sight, line=span, next_line=None, height_m=None)
-        if not is_here:
-            return replace(sight, estimate=None, line=None, next_line=None, height_m=None, is_whole=False)
-        if sight.is_whole:
-            known.follow(sight.line, now_s)
-            known.measure(sight.estimate, self._guidance.height_over_line_m / self._camera.fx_px)
         return sight
 
     def keep_notices(self, now_ns: int) -> None:

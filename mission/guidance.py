@@ -1,7 +1,6 @@
 """Guidance: from an estimate and the vehicle's state to the next setpoint. Pure functions.
 
 Frames: NED world; the level frame has its origin in the camera, x forward along the vehicle's heading, y right, z down.
-Distances in the level frame are per metre of height over the line, because one camera cannot tell the height.
 """
 
 import math
@@ -9,7 +8,7 @@ from dataclasses import dataclass, replace
 
 from drivers.camera.camera import Intrinsics
 from mission.autopilot import Setpoint, VehicleState
-from vision.records import LineEstimate, wrap_line_angle_rad
+from vision.records import ImageLine, wrap_line_angle_rad
 
 
 def wrap_angle_rad(angle_rad: float) -> float:
@@ -65,6 +64,14 @@ class WorldLine:
         along = nearest_heading_rad(self.heading_rad, heading_rad)
         return -math.sin(along) * (self.north_m - north_m) + math.cos(along) * (self.east_m - east_m)
 
+    def beside(self, right_m: float) -> "WorldLine":
+        """The line that runs `right_m` to the right of this one, for one who looks along its heading."""
+        return WorldLine(
+            self.heading_rad,
+            self.north_m - math.sin(self.heading_rad) * right_m,
+            self.east_m + math.cos(self.heading_rad) * right_m,
+        )
+
     def meeting_m(self, other: "WorldLine", north_m: float, east_m: float) -> float:
         """How far from a place this line and another one meet [m]; infinite for parallel ones."""
         sine = math.sin(other.heading_rad - self.heading_rad)
@@ -90,31 +97,37 @@ class WorldLine:
         return (d_north_m * math.sin(self.heading_rad) - d_east_m * math.cos(self.heading_rad)) / sine
 
 
-def height_over_m(
-    estimate: LineEstimate, camera: Intrinsics, spacing_m: float | None, planned_m: float
-) -> float | None:
-    """The height over conductors that lie `spacing_m` apart [m]; None where it cannot be told from this estimate.
+@dataclass(frozen=True, slots=True)
+class Bearing:
+    """Where a line is, seen from the vehicle: its heading [rad] and its slope.
 
-    What is not within half and twice the `planned_m` height is a spacing of other things.
+    For one who looks along the heading it passes abreast of the vehicle `slope` metres to the right for each metre that
+    it lies below: one camera cannot tell the height.
     """
-    if spacing_m is None or estimate.spacing_px is None or estimate.spacing_px < 1.0:
-        return None
-    height_m = spacing_m * camera.fx_px / estimate.spacing_px
-    return height_m if 0.5 * planned_m <= height_m <= 2.0 * planned_m else None
+
+    heading_rad: float
+    slope: float
+
+    def along(self, heading_rad: float) -> "Bearing":
+        """The same line, for one who looks along its other heading where that is nearer to `heading_rad`."""
+        nearest_rad = nearest_heading_rad(self.heading_rad, heading_rad)
+        return Bearing(nearest_rad, self.slope * math.copysign(1.0, math.cos(nearest_rad - self.heading_rad)))
+
+    def line(self, north_m: float, east_m: float, depth_m: float) -> WorldLine:
+        """The line on the map, `depth_m` below a vehicle at this place; its point is the one abreast of the vehicle."""
+        return WorldLine(self.heading_rad, north_m, east_m).beside(self.slope * depth_m)
 
 
-def locate_line(
-    estimate: LineEstimate, at_capture: VehicleState, camera: Intrinsics, height_over_line_m: float
-) -> WorldLine | None:
-    """Put the estimate's line on the map, undoing the vehicle's tilt.
+def bearing_of(image_line: ImageLine, at_capture: VehicleState, camera: Intrinsics) -> Bearing | None:
+    """Where a line of the image is, seen from the vehicle, undoing the vehicle's tilt.
 
     The camera looks along the body's down axis, image up is the body's forward. Two points of the image line become
-    rays, are turned by roll and pitch into the level frame and meet the plane of the conductors there. `at_capture` is
-    the vehicle's state when the frame was taken, so that the delay of vision does not steer. None where a ray does not
-    look down (more than 80 degrees from it).
+    rays, are turned by roll and pitch into the level frame and meet a level plane there. `at_capture` is the vehicle's
+    state when the frame was taken, so that the delay of vision does not steer. None where a ray does not look down
+    (more than 80 degrees from it).
     """
-    sine, cosine = math.sin(estimate.angle_rad), math.cos(estimate.angle_rad)
-    foot_px = (estimate.offset_px * cosine, estimate.offset_px * sine)  # along the right-hand normal, from the centre
+    sine, cosine = math.sin(image_line.angle_rad), math.cos(image_line.angle_rad)
+    foot_px = (image_line.offset_px * cosine, image_line.offset_px * sine)  # along the right-hand normal
     reach_px = 0.25 * camera.height_px
     points = []
     for along_px in (-reach_px, reach_px):
@@ -125,18 +138,11 @@ def locate_line(
         )
         if level[2] < math.cos(math.radians(80.0)) * math.hypot(*level):
             return None
-        points.append((level[0] / level[2] * height_over_line_m, level[1] / level[2] * height_over_line_m))
-    (x0_m, y0_m), (x1_m, y1_m) = points
-    bearing_rad = math.atan2(y1_m - y0_m, x1_m - x0_m)
-    # The point of the line nearest to the vehicle, so that an error of the height moves it least.
-    offset_m = -math.sin(bearing_rad) * x0_m + math.cos(bearing_rad) * y0_m
-    near_x_m, near_y_m = -math.sin(bearing_rad) * offset_m, math.cos(bearing_rad) * offset_m
-    yaw_sine, yaw_cosine = math.sin(at_capture.yaw_rad), math.cos(at_capture.yaw_rad)
-    return WorldLine(
-        wrap_angle_rad(at_capture.yaw_rad + bearing_rad),
-        at_capture.north_m + yaw_cosine * near_x_m - yaw_sine * near_y_m,
-        at_capture.east_m + yaw_sine * near_x_m + yaw_cosine * near_y_m,
-    )
+        points.append((level[0] / level[2], level[1] / level[2]))
+    (x0, y0), (x1, y1) = points
+    bearing_rad = math.atan2(y1 - y0, x1 - x0)
+    slope = -math.sin(bearing_rad) * x0 + math.cos(bearing_rad) * y0
+    return Bearing(wrap_angle_rad(at_capture.yaw_rad + bearing_rad), slope)
 
 
 def _level_from_body(

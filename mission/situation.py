@@ -95,12 +95,12 @@ class Situation:
         try:
             self.keep_words()
             self._eyes_view = self._view_of_eyes()
-            sight = self._lookout.look(now_ns, state, self.memory.known_line)
+            sight = self._lookout.look(now_ns, state, self.memory.known_line, self.height_m(state))
         except Exception as error:
             # Whatever fails in looking is as good as blind: a task that needs no eyes goes on without them.
             self._eyes_view = replace(self._eyes_view, failure=f"looking fails ({type(error).__name__}: {error})")
             return None
-        if sight is not None and sight.line is not None:
+        if sight is not None and sight.found is not None:
             self.memory.line_seen_at = Setpoint(state.north_m, state.east_m, state.down_m, state.yaw_rad)
         return sight
 

@@ -7,6 +7,7 @@ import numpy as np
 
 from vision.conductors import Conductor
 from vision.orientation import line_angle_distance_rad, main_angle_rad
+from vision.records import ImageLine
 
 _BEND_OVERLAP = 0.05  # share of the diagonal by which two pieces of one bent conductor may overlap
 
@@ -77,3 +78,9 @@ def spacing_px(conductors: list[Conductor], angle_rad: float, shape: tuple[int, 
         return None
     offsets_px = sorted(offset_px(conductor, angle_rad, shape) for conductor in conductors)
     return float(np.median(np.diff(offsets_px)))
+
+
+def one_by_one(conductors: list[Conductor], angle_rad: float, shape: tuple[int, int]) -> tuple[ImageLine, ...]:
+    """Each of the conductors for itself, from left to right for one who looks along `angle_rad`."""
+    from_left = sorted(conductors, key=lambda c: offset_px(c, angle_rad, shape))
+    return tuple(ImageLine(c.angle_rad, offset_px(c, c.angle_rad, shape)) for c in from_left)

@@ -23,9 +23,9 @@ from vision.finders import (
     SteerableSettings,
 )
 from vision.lens import LensCorrection
-from vision.line_group import abreast, choose_group, middle_offset_px, spacing_px
+from vision.line_group import abreast, choose_group, middle_offset_px, one_by_one, spacing_px
 from vision.orientation import main_angle_rad, mean_line_angle_rad, segment_angles_rad
-from vision.records import Detection, NextSpan, Segments
+from vision.records import Detection, ImageLine, Segments
 
 Detector = Literal["projection", "cbs", "steerable", "hough", "lsd", "edlines"]
 
@@ -154,7 +154,7 @@ class LineFinder:
             weights = (edges.coherence * edges.covered_px) ** 2
             peak_rad = main_angle_rad(segment_angles_rad(edges.segments), weights)
             return Detection(segments, power_lines, peak_rad, 0.0, 0, None, 0.0, False)
-        next_span = None if bend is None else NextSpan(bend.beyond.angle_rad, bend.beyond.offset_px)
+        next_span = None if bend is None else ImageLine(bend.beyond.angle_rad, bend.beyond.offset_px)
         return self._judge(segments, power_lines, group, beyond, next_span, shape)
 
     def _judge(
@@ -163,7 +163,7 @@ class LineFinder:
         power_lines: Segments,
         group: list[Conductor],
         beyond: list[Conductor],
-        next_span: NextSpan | None,
+        next_span: ImageLine | None,
         shape: tuple[int, int],
     ) -> Detection:
         """Say from the conductors, here and beyond a bend, whether there is a power line, and where its middle runs."""
@@ -188,4 +188,5 @@ class LineFinder:
             confidence if is_present else min(confidence, settings.presence_min_support),
             is_present,
             next_span,
+            one_by_one(row, angle_rad, shape),
         )

@@ -29,8 +29,8 @@ def wrap_line_angle_rad(angle_rad: float) -> float:
 
 
 @dataclass(frozen=True, slots=True)
-class NextSpan:
-    """The span on the other side of an angle support in view; `angle_rad` and `offset_px` as in LineEstimate."""
+class ImageLine:
+    """A straight line in the image; `angle_rad` and `offset_px` as in LineEstimate."""
 
     angle_rad: float
     offset_px: float
@@ -44,8 +44,9 @@ class LineEstimate:
     along its right-hand normal n = (cos angle_rad, sin angle_rad); so at angle 0 a positive offset is a line right of
     the centre. `n_lines` counts the conductors taken; `spacing_px` is the median distance of neighbours among them,
     None for a single one. `confidence` is in [0, 1], `t_capture_ns` is the frame's. Where the lens is calibrated, the
-    pixels are those of the undistorted image. Where the line bends in view, all of it is about the span abreast of the
-    image centre, and `next_span` about the other one.
+    pixels are those of the undistorted image. `conductors` are those that one cut across the group meets, one by one
+    from left to right; a source that does not tell them apart leaves it empty. Where the line bends in view, all of it
+    is about the span abreast of the image centre, and `next_span` is the middle of the other one.
     """
 
     angle_rad: float
@@ -54,7 +55,13 @@ class LineEstimate:
     spacing_px: float | None
     confidence: float
     t_capture_ns: int
-    next_span: NextSpan | None = None
+    next_span: ImageLine | None = None
+    conductors: tuple[ImageLine, ...] = ()
+
+    @property
+    def middle(self) -> ImageLine:
+        """The group's middle line."""
+        return ImageLine(self.angle_rad, self.offset_px)
 
 
 @dataclass(frozen=True, slots=True, eq=False)  # arrays have no single answer to ==
@@ -74,7 +81,8 @@ class Detection:
     spacing_px: float | None
     confidence: float
     is_present: bool
-    next_span: NextSpan | None = None
+    next_span: ImageLine | None = None
+    conductors: tuple[ImageLine, ...] = ()
 
     def estimate(self, t_capture_ns: int) -> LineEstimate | None:
         """The estimate that guidance gets for a frame taken at `t_capture_ns`: None where no line is present."""
@@ -88,6 +96,7 @@ class Detection:
             self.confidence,
             t_capture_ns,
             self.next_span,
+            self.conductors,
         )
 
 

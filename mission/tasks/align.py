@@ -61,16 +61,17 @@ class AlignTask:
 
     def _look(self, seen: Observation) -> None:
         sight = seen.sight
-        if sight is None or sight.line is None:
+        if sight is None or sight.found is None:
             return
-        heading_rad = sight.line.heading_rad
+        line = sight.found.line
+        heading_rad = line.heading_rad
         if self._target_rad is None:
             self._target_rad = self._choose(heading_rad, sight.yaw_at_capture_rad)
         else:
             self._target_rad = nearest_heading_rad(heading_rad, self._target_rad)
-        if sight.is_whole:
-            self._line = sight.line
-            self._memory.known_line.begin(sight.line, sight.t_capture_ns)
+        if sight.found.is_placed:
+            self._line = line
+            self._memory.known_line.begin()
         error_rad = wrap_angle_rad(self._target_rad - sight.yaw_at_capture_rad)
         self._n_in_a_row = self._n_in_a_row + 1 if abs(error_rad) < self._guidance.epsilon_rad else 0
 

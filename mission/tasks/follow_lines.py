@@ -6,12 +6,12 @@ from dataclasses import replace
 from mission.autopilot import Setpoint
 from mission.guidance import (
     GuidanceSettings,
-    WorldLine,
     step_along,
     step_sideways,
     turn_towards_rad,
     wrap_angle_rad,
 )
+from mission.known_line import Found
 from mission.tasks.height_hold import HeightHold
 from mission.tasks.odometer import NEARLY_M, Odometer
 from mission.tasks.span_choice import SpanChoice
@@ -55,8 +55,8 @@ class FollowLinesTask:
         """Turn, go ahead, and (centred) go sideways."""
         guidance = self._guidance
         self._unseen_s += seen.dt_s
-        if seen.sight is not None and seen.sight.line is not None:
-            self._see(reference, seen.sight, seen.sight.line)
+        if seen.sight is not None and seen.sight.found is not None:
+            self._see(reference, seen.sight, seen.sight.found)
         setpoint = reference
         turn_rad = 0.0
         if self._spans.target_rad is not None:
@@ -93,14 +93,14 @@ class FollowLinesTask:
             return Step(setpoint, done=f"followed the line for {self._distance_m:g} m")
         return Step(setpoint)
 
-    def _see(self, reference: Setpoint, sight: Sight, line: WorldLine) -> None:
-        if sight.is_whole:
-            self._memory.known_line.begin(line, sight.t_capture_ns)
+    def _see(self, reference: Setpoint, sight: Sight, found: Found) -> None:
+        if found.is_placed:
+            self._memory.known_line.begin()
         if not self._guidance.is_centred:
             target_rad = self._spans.target_rad
-            self._spans.take(line, reference.yaw_rad if target_rad is None else target_rad, is_place_sure=True)
+            self._spans.take(found.line, reference.yaw_rad if target_rad is None else target_rad, is_place_sure=True)
             self._unseen_s = 0.0
-        elif self._spans.see(reference, sight, line, self._odometer.moved_m, self._unseen_s):
+        elif self._spans.see(reference, sight, self._odometer.moved_m, self._unseen_s):
             self._unseen_s = 0.0
 
     def _wanted_pace(self, turn_rad: float, dt_s: float) -> float:

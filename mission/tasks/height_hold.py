@@ -30,8 +30,9 @@ class HeightHold:
         if self._lowest_down_m is None:
             self._lowest_down_m = setpoint.down_m
         self._unseen_s += seen.dt_s
-        if seen.sight is not None and seen.sight.height_m is not None:
-            self._line_downs_m.append(seen.sight.down_m + seen.sight.height_m)
+        found = None if seen.sight is None else seen.sight.found
+        if seen.sight is not None and found is not None and found.height_m is not None:
+            self._line_downs_m.append(seen.sight.down_m + found.height_m)
             self._unseen_s = 0.0
         if self._unseen_s > _FORGET_S:
             self._line_downs_m.clear()

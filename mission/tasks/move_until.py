@@ -3,13 +3,11 @@
 import math
 
 from mission.autopilot import Setpoint
-from mission.guidance import GuidanceSettings, WorldLine, step_along
-from mission.parallax import Parallax
+from mission.guidance import GuidanceSettings, step_along
 from mission.tasks.odometer import NEARLY_M, Odometer
-from mission.tasks.task import FlightMemory, Observation, Sight, Step, is_there
+from mission.tasks.task import FlightMemory, Observation, Step, is_there
 
-_ABOVE_GROUND = 0.75
-"""Share of the height over the take-off point: what seems to be further below than that lies on the ground."""
+_GONE_S = 2.0  # a line that was to be here, and is not seen for so long, is none
 
 
 class MoveUntilTask:
@@ -17,7 +15,8 @@ class MoveUntilTask:
 
     The thesis stops there. By default we go on until the line is right below, because a vehicle beside the line would
     follow it from the side, and the way home, which is as long as the way here, would miss the take-off point. And we
-    go on over what lies on the ground, which may look like a line: it passes below more slowly than conductors do.
+    go on until the way flown has told how far below the line is (mission/wires.py): what lies on the ground may look
+    like one.
     """
 
     needs_line = False
@@ -40,9 +39,8 @@ class MoveUntilTask:
         self._odometer = Odometer()
         self._n_in_a_row = 0
         self._blind_s = 0.0
+        self._unseen_s = 0.0
         self._goal_m: float | None = None
-        self._parallax = Parallax(guidance.height_over_line_m)
-        self._is_sure = False
         memory.known_line.forget()
 
     @property
@@ -58,6 +56,7 @@ class MoveUntilTask:
         # Without frames the line could pass below unseen: then wait for them, or for the vision_dead event.
         self._blind_s = 0.0 if seen.sight is not None else self._blind_s + seen.dt_s
         is_blind = self._blind_s > self._guidance.max_estimate_age_s
+        self._unseen_s += 0.0 if is_blind else seen.dt_s
         limit_m = 0.0 if is_blind else self._guidance.r_m_s * seen.dt_s
         goal_m = self._max_distance_m if self._goal_m is None else self._goal_m
         step_m = max(-limit_m, min(limit_m, goal_m - moved_m))
@@ -69,6 +68,11 @@ class MoveUntilTask:
         if abs(self._goal_m - moved_m) < self._guidance.r_m_s * seen.dt_s and is_there(
             seen.state, setpoint, self._guidance.arrival_m
         ):
+            if self._is_overhead and self._unseen_s > self._guidance.max_estimate_age_s:
+                if self._unseen_s > _GONE_S:  # what seemed to be here is not: look on
+                    self._memory.known_line.forget()
+                    self._goal_m = None
+                return Step(setpoint)
             self._memory.move_until_m = self._from_start_m(setpoint, heading_rad)
             where = "over the line" if self._is_overhead else "the line is in sight"
             return Step(setpoint, done=f"{where} after {moved_m:.1f} m")
@@ -88,9 +92,11 @@ class MoveUntilTask:
         sight = seen.sight
         if sight is None:
             return
-        if sight.line is None or not self._may_be_it(sight, sight.line, heading_rad):
-            self._n_in_a_row, self._goal_m = 0, self._goal_m if self._is_overhead and self._is_sure else None
+        found = sight.found
+        if found is None or (self._is_overhead and found.line.crossing_m(0.0, 0.0, heading_rad) is None):
+            self._n_in_a_row, self._goal_m = 0, self._goal_m if self._is_overhead else None
             return
+        self._unseen_s = 0.0
         self._n_in_a_row += 1
         if self._n_in_a_row < self._n_detections:
             return
@@ -100,24 +106,8 @@ class MoveUntilTask:
                 lag_m = lag_north_m * math.cos(heading_rad) + lag_east_m * math.sin(heading_rad)
                 self._goal_m = self._odometer.moved_m + min(0.0, lag_m)
             return
-        crossing_m = sight.line.crossing_m(reference.north_m, reference.east_m, heading_rad)
-        if crossing_m is not None and self._is_sure and (sight.is_whole or self._goal_m is None):
+        crossing_m = found.line.crossing_m(reference.north_m, reference.east_m, heading_rad)
+        if found.depth_m is None or crossing_m is None:  # it may lie on the ground: go on, and see
+            self._goal_m = None
+        else:
             self._goal_m = min(self._odometer.moved_m + crossing_m, self._max_distance_m)
-
-    def _may_be_it(self, sight: Sight, line: WorldLine, heading_rad: float) -> bool:
-        """Whether the line in sight may be the one to stop over: it crosses the way, high above the ground.
-
-        How high is told by its parallax, which takes some way; until then the vehicle goes on, and may pass the line.
-        """
-        if not self._is_overhead:
-            return True
-        seen_m = line.crossing_m(sight.north_m, sight.east_m, heading_rad)
-        if seen_m is None:
-            return False
-        way_m = sight.north_m * math.cos(heading_rad) + sight.east_m * math.sin(heading_rad)
-        if sight.height_m is not None:  # the line was put on the map by the height that was seen
-            seen_m *= self._guidance.height_over_line_m / sight.height_m
-        self._parallax.add(way_m, seen_m, 0 if sight.estimate is None else sight.estimate.n_lines)
-        height_m = self._parallax.height_m
-        self._is_sure = height_m is not None and height_m < _ABOVE_GROUND * (self._memory.start.down_m - sight.down_m)
-        return self._is_sure or height_m is None

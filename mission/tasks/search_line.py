@@ -69,7 +69,7 @@ class SearchLineTask:
 
     def _look(self, seen: Observation) -> None:
         self._unseen_s += seen.dt_s
-        if seen.sight is not None and seen.sight.line is not None:
+        if seen.sight is not None and seen.sight.found is not None:
             self._n_in_a_row += 1
             self._unseen_s = 0.0
         elif seen.sight is not None or self._unseen_s > _BLIND_S:

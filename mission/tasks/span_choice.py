@@ -49,24 +49,29 @@ class SpanChoice:
         self.target_rad = nearest_heading_rad(line.heading_rad, heading_rad)
         self.line = line if is_place_sure else self.line
 
-    def see(self, reference: Setpoint, sight: Sight, line: WorldLine, moved_m: float, unseen_s: float) -> bool:
+    def see(self, reference: Setpoint, sight: Sight, moved_m: float, unseen_s: float) -> bool:
         """Take in a sight, `unseen_s` after the last one that counted; false where it does not count.
 
-        Such a one shows nothing but the span that the setpoint has left at a bend, which the vehicle may still be over.
+        Such a one shows no line, or nothing but the span that the setpoint has left at a bend, which the vehicle may
+        still be over.
         """
+        found = sight.found
+        if found is None:
+            return False
+        line = found.line
         if self.target_rad is None:
-            self.take(line, reference.yaw_rad, is_place_sure=sight.is_whole)
+            self.take(line, reference.yaw_rad, is_place_sure=found.is_placed)
             return True
         target_rad = self.target_rad
-        in_sight = [span for span in (line, sight.next_line) if span is not None]
+        in_sight = [span for span in (line, found.next_line) if span is not None]
         spans = [span for span in in_sight if not self._is_left(span, moved_m)]
         if not spans:
             if unseen_s <= _DOUBT_S:
                 return False
             self._left, spans = None, in_sight
         spans.sort(key=lambda span: abs(wrap_line_angle_rad(span.heading_rad - target_rad)))
-        is_bent = sight.next_line is not None
-        self.take(spans[0], target_rad, is_place_sure=sight.is_whole or is_bent)
+        is_bent = found.next_line is not None
+        self.take(spans[0], target_rad, is_place_sure=found.is_placed or is_bent)
         self.bend_m = None
         if len(spans) == 2:
             self._approach(reference, sight, spans[0], spans[1], moved_m, is_passed=spans[0] is not line)

@@ -9,32 +9,23 @@ from dataclasses import dataclass, field
 from typing import Protocol
 
 from mission.autopilot import FlightMode, Setpoint, VehicleState
-from mission.guidance import WorldLine
-from mission.known_line import KnownLine
+from mission.known_line import Found, KnownLine
 from mission.trail import Trail
-from vision.records import LineEstimate
 
 
 @dataclass(frozen=True, slots=True)
 class Sight:
-    """What one frame showed: None for `estimate` and `line` where it showed no line.
+    """What one frame showed; `found` is None where it showed no line that counts.
 
-    `line` is the estimate put on the map with the vehicle's pose at the time of capture. Its heading always counts; its
-    place only where `is_whole`: when the frame showed all of the line's conductors, as far as known. The vehicle was at
-    `north_m`, `east_m`, `down_m` then. `next_line` is the span on the other side of an angle support in view,
-    `height_m` the height over the conductors, where all of them were seen and their spacing is known.
+    What it says was worked out with the vehicle's pose at the time of capture: `north_m`, `east_m`, `down_m`, and yaw.
     """
 
     t_capture_ns: int
     yaw_at_capture_rad: float
-    estimate: LineEstimate | None
-    line: WorldLine | None
-    is_whole: bool
-    north_m: float = 0.0
-    east_m: float = 0.0
-    down_m: float = 0.0
-    next_line: WorldLine | None = None
-    height_m: float | None = None
+    north_m: float
+    east_m: float
+    down_m: float
+    found: Found | None
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,4 +1,4 @@
-"""What the executive makes of reports: the state at capture time, and the size of the group."""
+"""What the executive makes of reports: the state at capture time, and where its conductors are seen."""
 
 import math
 from dataclasses import replace
@@ -8,10 +8,11 @@ import pytest
 from mission.autopilot import FlightMode, LandedState, VehicleState
 from mission.build import guidance_settings
 from mission.camera_plan import pinhole_intrinsics
-from mission.eyes import GroupSize, StateHistory, sight_of
+from mission.eyes import StateHistory, sight_of, view_of
+from mission.known_line import KnownLine
 from mission.plan import CameraPlan, GuidancePlan
 from tests.support.geometric_eyes import bare_report
-from vision.records import BLINDING, LineEstimate, Trouble, VisionReport
+from vision.records import BLINDING, ImageLine, LineEstimate, Trouble, VisionReport
 
 STATE = VehicleState(
     0, 0, 0, -16, 0, 0, 0, 0, 0, 0, FlightMode.OFFBOARD, True, LandedState.IN_AIR, 0.9, is_connected=True
@@ -58,46 +59,42 @@ def report(t_ns: int, n_lines: int | None) -> VisionReport:
 def test_an_old_estimate_does_not_steer() -> None:
     camera, guidance = pinhole_intrinsics(CameraPlan()), guidance_settings(GuidancePlan())
     kept = history(replace(STATE, t_ns=S))
-    fresh = sight_of(report(S, 3), kept, GroupSize(), camera, guidance, S + S // 2)
+    fresh = sight_of(report(S, 3), kept, KnownLine(), camera, guidance, 16.0, S + S // 2)
     assert fresh is not None
-    assert fresh.line is not None
-    assert sight_of(report(S, 3), kept, GroupSize(), camera, guidance, S + S // 2 + 1) is None
+    assert fresh.found is not None
+    assert sight_of(report(S, 3), kept, KnownLine(), camera, guidance, 16.0, S + S // 2 + 1) is None
 
 
 def test_a_frame_without_a_line_is_a_sight_without_a_line() -> None:
     camera, guidance = pinhole_intrinsics(CameraPlan()), guidance_settings(GuidancePlan())
-    seen = sight_of(report(S, None), history(replace(STATE, t_ns=S)), GroupSize(), camera, guidance, S)
+    seen = sight_of(report(S, None), history(replace(STATE, t_ns=S)), KnownLine(), camera, guidance, 16.0, S)
     assert seen is not None
-    assert seen.line is None
+    assert seen.found is None
 
 
 @pytest.mark.parametrize("trouble", Trouble)
 def test_a_frame_that_nothing_can_be_seen_in_is_no_sight(trouble: Trouble) -> None:
     camera, guidance = pinhole_intrinsics(CameraPlan()), guidance_settings(GuidancePlan())
     troubled = replace(report(S, None), trouble=trouble)
-    seen = sight_of(troubled, history(replace(STATE, t_ns=S)), GroupSize(), camera, guidance, S)
+    seen = sight_of(troubled, history(replace(STATE, t_ns=S)), KnownLine(), camera, guidance, 16.0, S)
     assert (seen is None) is (trouble in BLINDING)
 
 
-def test_a_part_of_the_group_is_not_whole_once_the_group_is_known() -> None:
-    group = GroupSize()
-    assert [group.is_whole(1) for _ in range(4)] == [True] * 4
-    assert [group.is_whole(3) for _ in range(4)] == [True] * 4
-    assert not group.is_whole(2)
-    assert group.is_whole(3)
+def test_conductors_are_seen_from_left_to_right_whichever_way_the_image_line_is_counted() -> None:
+    """Conductors across the image: one runs at 89 degrees, the next at -89, and both go the same way."""
+    camera = pinhole_intrinsics(CameraPlan())
+    conductors = (ImageLine(math.radians(89.0), -60.0), ImageLine(math.radians(-89.0), 0.0))
+    estimate = replace(report(S, 2).estimate, angle_rad=math.pi / 2, offset_px=-30.0, conductors=conductors)  # type: ignore[type-var]
+    view = view_of(estimate, replace(STATE, t_ns=S), camera, 16.0)
+    assert view is not None
+    slopes = [bearing.slope for bearing in view.along(math.pi / 2).conductors]
+    assert slopes == pytest.approx([-60.0 / camera.fx_px, 0.0], abs=0.02)
+    assert view.in_view[0] < -0.4
+    assert view.in_view[1] > 0.4
 
 
-def test_one_wrong_count_does_not_make_the_line_larger() -> None:
-    group = GroupSize()
-    assert all(group.is_whole(3) for _ in range(50))
-    group.is_whole(5)
-    assert group.is_whole(3)
-
-
-def test_the_group_shrinks_when_a_conductor_ends() -> None:
-    group = GroupSize(window=40)
-    for _ in range(40):
-        group.is_whole(3)
-    seen = [group.is_whole(2) for _ in range(40)]
-    assert not seen[0]
-    assert seen[-1]
+def test_a_line_above_the_horizon_is_no_view() -> None:
+    camera = pinhole_intrinsics(CameraPlan())
+    estimate = report(S, 3).estimate
+    assert estimate is not None
+    assert view_of(estimate, replace(STATE, t_ns=S, pitch_rad=1.5), camera, 16.0) is None

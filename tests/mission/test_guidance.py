@@ -10,8 +10,8 @@ from drivers.camera.camera import Intrinsics
 from mission.autopilot import FlightMode, LandedState, Setpoint, VehicleState
 from mission.guidance import (
     WorldLine,
+    bearing_of,
     leash,
-    locate_line,
     nearest_heading_rad,
     step_level_towards,
     step_sideways,
@@ -83,8 +83,9 @@ def test_a_line_to_the_right_of_the_image_lies_to_the_right_of_the_vehicle() -> 
     estimate = see_line((0.0, 0.0, -16.0), quaternion(0, 0, math.pi / 2), CAMERA, (-2.0, 0.0, -10.0), math.pi / 2)
     assert estimate is not None
     assert estimate.offset_px > 0
-    line = locate_line(estimate, state(yaw=math.pi / 2), CAMERA, 6.0)
-    assert line is not None
+    bearing = bearing_of(estimate.middle, state(yaw=math.pi / 2), CAMERA)
+    assert bearing is not None
+    line = bearing.line(0.0, 0.0, 6.0)
     assert line.offset_m(0.0, 0.0, math.pi / 2) == pytest.approx(2.0, abs=0.02)
     assert line.north_m == pytest.approx(-2.0, abs=0.02)
 
@@ -97,8 +98,9 @@ def test_a_line_is_located_whatever_the_tilt(
     estimate = see_line((north_m, east_m, -16.0), quaternion(roll, pitch, yaw), CAMERA, point, heading)
     if estimate is None:
         return
-    line = locate_line(estimate, state(north_m, east_m, roll, pitch, yaw), CAMERA, 6.0)
-    assert line is not None
+    bearing = bearing_of(estimate.middle, state(north_m, east_m, roll, pitch, yaw), CAMERA)
+    assert bearing is not None
+    line = bearing.line(north_m, east_m, 6.0)
     assert abs(math.sin(line.heading_rad - heading)) < math.radians(0.1)
     assert abs(line.offset_m(point[0], point[1], heading)) < 0.02
 
@@ -106,7 +108,7 @@ def test_a_line_is_located_whatever_the_tilt(
 def test_a_ray_above_the_horizon_locates_nothing() -> None:
     estimate = see_line((0.0, 0.0, -16.0), quaternion(0, 0, 0), CAMERA, (0.0, 0.0, -10.0), 0.0)
     assert estimate is not None
-    assert locate_line(estimate, state(pitch=1.4), CAMERA, 6.0) is None
+    assert bearing_of(estimate.middle, state(pitch=1.4), CAMERA) is None
 
 
 @given(angles, st.floats(1.0, 30.0), st.floats(math.radians(25), math.radians(155)))

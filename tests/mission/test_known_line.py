@@ -1,65 +1,159 @@
-"""Which lines count as the one that is followed."""
+"""Which lines count as the one that is followed, and where its middle is."""
 
 import math
+from dataclasses import replace
 
 import pytest
 
-from mission.guidance import WorldLine
-from mission.known_line import KnownLine
-from vision.records import LineEstimate
+from drivers.clock import NS_PER_S
+from mission.build import guidance_settings
+from mission.guidance import Bearing
+from mission.known_line import Found, KnownLine, View
+from mission.plan import GuidancePlan
 
-NORTHWARD = WorldLine(0.0, 0.0, 0.0)
-
-
-def known(half_width_m: float = 0.0) -> KnownLine:
-    line = KnownLine(half_width_m=half_width_m)
-    line.begin(NORTHWARD, 0)
-    return line
-
-
-def beside(aside_m: float, turn_deg: float = 0.0) -> WorldLine:
-    return WorldLine(math.radians(turn_deg), 0.0, aside_m)
+GUIDANCE = guidance_settings(GuidancePlan(height_over_line_m=6.0))
+EAST = math.pi / 2
+FRAME_NS = NS_PER_S // 30
+PLACES_M = (-0.8, 0.0, 0.8)
 
 
-def test_before_a_line_is_known_any_may_be_it() -> None:
-    assert KnownLine().is_it(beside(30.0, 80.0), 0.0, 0.0, 0.0, is_whole=True)
+def view(
+    north_m: float,
+    places_m: tuple[float, ...] = PLACES_M,
+    *,
+    t_ns: int = 0,
+    depth_m: float = 6.0,
+    heading_rad: float = EAST,
+    east_m: float = 0.0,
+    climb_m: float = 0.0,
+) -> View:
+    """A vehicle at `north_m` sees conductors that run east at `places_m` south of the origin."""
+    bearings = tuple(Bearing(heading_rad, (place_m + north_m) / (depth_m + climb_m)) for place_m in places_m)
+    middle = Bearing(heading_rad, 0.5 * (bearings[0].slope + bearings[-1].slope))
+    return View(t_ns, north_m, east_m, -16.0 - climb_m, 16.0 + climb_m, middle, bearings, (-0.8, 0.8))
 
 
-@pytest.mark.parametrize(
-    ("aside_m", "after_s", "is_it"), [(0.8, 0.0, True), (2.5, 0.0, False), (2.5, 10.0, True), (6.0, 1000.0, False)]
-)
+def flown_to(
+    north_m: float = 0.0, *, depth_m: float = 6.0, spacing_m: float | None = None
+) -> tuple[KnownLine, int, Found | None]:
+    """A line to which a vehicle has flown from the south; the time, and what it saw last."""
+    known, found, t_ns = KnownLine(), None, 0
+    guidance = replace(GUIDANCE, conductor_spacing_m=spacing_m)
+    for k in range(round((north_m + 5.0) / 0.08) + 1):
+        t_ns = k * FRAME_NS
+        found = known.see(view(-5.0 + 0.08 * k, t_ns=t_ns, depth_m=depth_m), guidance)
+    known.begin()
+    return known, t_ns, found
+
+
+def test_any_line_may_be_it_at_first_and_how_far_below_is_not_known() -> None:
+    found = KnownLine().see(view(-4.0), GUIDANCE)
+    assert found is not None
+    assert found.depth_m is None
+    assert found.line.offset_m(-4.0, 0.0, EAST) == pytest.approx(-4.0)
+
+
+def test_the_way_to_it_tells_how_far_below_it_is() -> None:
+    _, _, found = flown_to(depth_m=8.0)
+    assert found is not None
+    assert found.depth_m == pytest.approx(8.0, rel=0.03)
+    assert found.line.offset_m(0.0, 0.0, EAST) == pytest.approx(0.0, abs=0.05)
+
+
+def test_what_lies_on_the_ground_is_no_line() -> None:
+    _, _, found = flown_to(depth_m=16.0)
+    assert found is None
+
+
+def test_a_part_of_the_line_tells_where_all_of_it_is() -> None:
+    known, t_ns, _ = flown_to()
+    found = known.see(view(0.3, (0.8,), t_ns=t_ns + FRAME_NS), GUIDANCE)
+    assert found is not None
+    assert found.line.offset_m(0.0, 0.0, EAST) == pytest.approx(0.0, abs=0.1)
+
+
+def test_a_conductor_too_many_moves_nothing() -> None:
+    known, t_ns, _ = flown_to()
+    for k in range(1, 40):
+        found = known.see(view(0.0, (*PLACES_M, 2.4), t_ns=t_ns + k * FRAME_NS), GUIDANCE)
+        assert found is not None
+        assert found.line.offset_m(0.0, 0.0, EAST) == pytest.approx(0.0, abs=0.1)
+
+
+@pytest.mark.parametrize(("aside_m", "after_s", "is_it"), [(2.5, 0.1, False), (2.5, 10.0, True), (6.0, 1000.0, False)])
 def test_a_line_does_not_jump_sideways_but_the_position_drifts(aside_m: float, after_s: float, is_it: bool) -> None:
     for sign in (-1, 1):
-        assert known().is_it(beside(sign * aside_m), 0.0, 0.0, after_s, is_whole=True) is is_it
-
-
-def test_the_middle_of_a_part_may_lie_beside_the_line() -> None:
-    wide = known(half_width_m=4.0)
-    assert wide.is_it(beside(4.5), 0.0, 0.0, 0.0, is_whole=False)
-    assert not wide.is_it(beside(4.5), 0.0, 0.0, 0.0, is_whole=True)
+        known, t_ns, _ = flown_to()
+        moved = view(0.0, tuple(place_m + sign * aside_m for place_m in PLACES_M), t_ns=t_ns + int(after_s * NS_PER_S))
+        assert (known.see(moved, GUIDANCE) is not None) is is_it
 
 
 @pytest.mark.parametrize("turn_deg", [-60.0, -30.0, 30.0, 60.0])
 def test_a_span_begins_where_the_last_one_ends(turn_deg: float) -> None:
-    bend_ahead = WorldLine(math.radians(turn_deg), 3.0, 0.0)
-    assert known().is_it(bend_ahead, 0.0, 0.0, 0.0, is_whole=True)
-    far_away = WorldLine(math.radians(turn_deg), 30.0, 0.0)
-    assert not known().is_it(far_away, 0.0, 0.0, 0.0, is_whole=True)
+    heading_rad = EAST + math.radians(turn_deg)
+    known, t_ns, _ = flown_to()
+    # Abreast of the vehicle the next span passes where it has come to from a bend 3 m back.
+    aside_m = -3.0 * math.sin(math.radians(turn_deg))
+    turned = view(0.0, tuple(p - aside_m for p in PLACES_M), t_ns=t_ns + FRAME_NS, heading_rad=heading_rad)
+    found = known.see(turned, GUIDANCE)
+    assert found is not None
+    assert math.cos(found.line.heading_rad - heading_rad) == pytest.approx(1.0)
+    assert found.line.offset_m(0.0, 0.0, heading_rad) == pytest.approx(-aside_m, abs=0.1)
+    far_away = view(0.0, tuple(p + 25.0 for p in PLACES_M), t_ns=t_ns, heading_rad=EAST + math.radians(turn_deg))
+    assert flown_to()[0].see(far_away, GUIDANCE) is None
 
 
 def test_a_line_across_is_another_one() -> None:
-    assert not known().is_it(beside(0.0, 80.0), 0.0, 0.0, 0.0, is_whole=True)
+    known, t_ns, _ = flown_to()
+    assert known.see(view(0.0, t_ns=t_ns + FRAME_NS, heading_rad=EAST + math.radians(80.0)), GUIDANCE) is None
+
+
+def test_before_one_is_followed_another_direction_is_looked_at_when_it_stays() -> None:
+    known = KnownLine()
+    for k in range(5):
+        known.see(view(-4.0, t_ns=k * FRAME_NS), GUIDANCE)
+    seen = [known.see(view(-4.0, t_ns=(5 + k) * FRAME_NS, heading_rad=0.8), GUIDANCE) for k in range(3)]
+    assert [found is not None for found in seen] == [False, False, True]
+
+
+def test_the_known_line_is_found_beyond_a_bend_that_shows_another_one() -> None:
+    known, t_ns, _ = flown_to()
+    across = view(0.0, tuple(p + 25.0 for p in PLACES_M), t_ns=t_ns + FRAME_NS, heading_rad=EAST + math.radians(40.0))
+    found = known.see(replace(across, next_span=Bearing(EAST, 0.0)), GUIDANCE)
+    assert found is not None
+    assert not found.is_placed
+    assert found.line.heading_rad == pytest.approx(EAST)
 
 
 def test_it_may_be_forgotten() -> None:
-    line = known(2.0)
-    line.forget()
-    assert line.line is None
-    assert line.half_width_m == 0.0
-    assert line.is_it(beside(9.0), 0.0, 0.0, 0.0, is_whole=True)
+    known, t_ns, _ = flown_to()
+    elsewhere = view(0.0, tuple(place_m + 9.0 for place_m in PLACES_M), t_ns=t_ns + FRAME_NS)
+    assert known.see(elsewhere, GUIDANCE) is None
+    known.forget()
+    assert known.see(elsewhere, GUIDANCE) is not None
 
 
-def test_a_whole_sight_tells_how_wide_the_line_is() -> None:
-    line = known()
-    line.measure(LineEstimate(0.0, 0.0, 3, 51.0, 1.0, 0), 6.0 / 381.0)
-    assert line.half_width_m == pytest.approx(0.8, abs=0.01)
+def test_the_height_is_told_by_the_spacing_when_all_conductors_are_seen() -> None:
+    known, t_ns, found = flown_to(spacing_m=0.8, depth_m=6.6)
+    guidance = replace(GUIDANCE, conductor_spacing_m=0.8)
+    assert found is not None
+    assert found.height_m == pytest.approx(6.6, rel=0.01)
+    part = known.see(view(0.0, (0.0, 0.8), t_ns=t_ns + FRAME_NS, depth_m=6.6), guidance)
+    assert part is not None
+    assert part.height_m is None
+
+
+def test_a_spacing_that_contradicts_the_way_flown_tells_no_height() -> None:
+    _, _, found = flown_to(spacing_m=1.6, depth_m=6.0)
+    assert found is not None
+    assert found.depth_m == pytest.approx(6.0, rel=0.03)
+    assert found.height_m is None
+
+
+def test_a_climb_changes_no_place() -> None:
+    known, t_ns, _ = flown_to(north_m=1.0)
+    for k in range(1, 60):
+        found = known.see(view(1.0, t_ns=t_ns + k * FRAME_NS, climb_m=0.05 * k), GUIDANCE)
+    assert found is not None
+    assert found.depth_m == pytest.approx(6.0 + 0.05 * 59, rel=0.05)
+    assert found.line.offset_m(0.0, 0.0, EAST) == pytest.approx(0.0, abs=0.1)

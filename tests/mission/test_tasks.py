@@ -8,9 +8,9 @@ import pytest
 from mission.autopilot import FlightMode, LandedState, Setpoint, VehicleState
 from mission.build import build_task, guidance_settings
 from mission.guidance import GuidanceSettings, WorldLine
+from mission.known_line import Found
 from mission.plan import Align, Ascend, FollowLines, GuidancePlan, Land, MoveForward, MoveUntil, Rotate, Takeoff
 from mission.tasks.task import Command, FlightMemory, Observation, Sight, Step, Task
-from vision.records import LineEstimate
 
 GUIDANCE = guidance_settings(GuidancePlan())
 START = Setpoint(0.0, 0.0, 0.0, 0.0)
@@ -26,9 +26,18 @@ def state_at(setpoint: Setpoint, **changes: object) -> VehicleState:
     return replace(state, **changes)  # type: ignore[arg-type]
 
 
-def sight(line: WorldLine | None, yaw_rad: float = 0.0, *, is_whole: bool = True, at: Setpoint = UP) -> Sight:
-    estimate = None if line is None else LineEstimate(0.0, 0.0, 3, None, 1.0, 0)
-    return Sight(0, yaw_rad, estimate, line, is_whole, at.north_m, at.east_m, at.down_m)
+def sight(
+    line: WorldLine | None,
+    yaw_rad: float = 0.0,
+    *,
+    at: Setpoint = UP,
+    is_placed: bool = True,
+    next_line: WorldLine | None = None,
+    depth_m: float | None = 6.0,
+    height_m: float | None = None,
+) -> Sight:
+    found = None if line is None else Found(line, is_placed, next_line, depth_m, height_m)
+    return Sight(0, yaw_rad, at.north_m, at.east_m, at.down_m, found)
 
 
 def fly_perfectly(
@@ -76,9 +85,9 @@ def test_following_does_not_go_ahead_without_a_line() -> None:
     assert reference.north_m <= GUIDANCE.r_m_s * GUIDANCE.max_estimate_age_s + 1e-9
 
 
-def test_following_takes_the_place_of_whole_groups_only() -> None:
+def test_following_takes_the_place_of_a_placed_line_only() -> None:
     task = build_task(FollowLines(task="follow_lines", distance_m=20.0), GUIDANCE, memory())
-    partial = sight(WorldLine(0.0, 0.0, 5.0), is_whole=False)
+    partial = sight(WorldLine(0.0, 0.0, 5.0), is_placed=False)
     step = task.step(UP, Observation(0.05, state_at(UP), partial))
     assert step.setpoint is not None
     assert step.setpoint.east_m == 0.0
@@ -139,6 +148,39 @@ def test_move_until_goes_on_until_the_line_is_below_and_remembers_the_way_from_t
     assert step.done
     assert end.north_m == pytest.approx(9.0, abs=0.15)
     assert kept.move_until_m == pytest.approx(10.0, abs=0.15)
+
+
+def test_move_until_goes_on_over_what_may_lie_on_the_ground() -> None:
+    """Until the way flown has told how far below the line is; then it stops over it, or goes back to it."""
+    task = build_task(MoveUntil(task="move_until", max_distance_m=30.0), GUIDANCE, memory())
+    line, reference = WorldLine(math.pi / 2, 9.0, 0.0), UP
+    norths_m, step = [], Step()
+    for tick in range(800):
+        seen = sight(line, at=reference, depth_m=None if tick < 300 else 6.0)
+        step = task.step(reference, Observation(0.05, state_at(reference), seen))
+        reference = step.setpoint or reference
+        norths_m.append(reference.north_m)
+        if step.done:
+            break
+    assert max(norths_m) > 15.0
+    assert step.done
+    assert norths_m[-1] == pytest.approx(9.0, abs=0.15)
+
+
+def test_move_until_goes_on_where_the_line_is_not_seen_where_it_was_to_be() -> None:
+    """Something like a line 6 m ahead that is gone when the vehicle comes there, and a line 15 m ahead."""
+    kept = memory()
+    task = build_task(MoveUntil(task="move_until", max_distance_m=30.0), GUIDANCE, kept)
+    reference, step = UP, Step()
+    for _ in range(800):
+        north_m = reference.north_m
+        line = WorldLine(math.pi / 2, 6.0 if north_m < 4.0 else 15.0, 0.0) if not 4.0 <= north_m < 11.0 else None
+        step = task.step(reference, Observation(0.05, state_at(reference), sight(line, at=reference)))
+        reference = step.setpoint or reference
+        if step.done:
+            break
+    assert step.done
+    assert reference.north_m == pytest.approx(15.0, abs=0.15)
 
 
 def test_move_until_waits_while_nothing_is_seen() -> None:
@@ -258,7 +300,7 @@ def test_following_holds_the_height_over_the_conductors_but_never_sinks_below_wh
     heights_m = []
     for tick in range(600):
         line_m = line_down_m - (3.0 if 150 < tick < 400 else -3.0 if tick >= 400 else 0.0)
-        seen = replace(sight(WorldLine(0.0, 0.0, 0.0), at=reference), height_m=line_m - reference.down_m)
+        seen = sight(WorldLine(0.0, 0.0, 0.0), at=reference, height_m=line_m - reference.down_m)
         reference = task.step(reference, Observation(0.05, state_at(reference), seen)).setpoint or reference
         heights_m.append(-reference.down_m)
     assert heights_m[140] == pytest.approx(16.0, abs=0.1)
@@ -274,7 +316,7 @@ def test_following_turns_where_the_line_bends_and_not_where_it_is_seen_to() -> N
     reference, track = UP, []
     for _ in range(500):
         spans = (here, beyond) if reference.north_m < 5.0 else (beyond, here)
-        seen = replace(sight(spans[0], reference.yaw_rad, at=reference), next_line=spans[1])
+        seen = sight(spans[0], reference.yaw_rad, at=reference, next_line=spans[1])
         reference = task.step(reference, Observation(0.05, state_at(reference), seen)).setpoint or reference
         track.append(reference)
     before = [place for place in track if place.north_m < 4.5]

@@ -1,0 +1,150 @@
+"""Conductors told apart by their places and depths, from slopes seen along a way across them."""
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mission.wires import Wire, Wires
+
+FRAME_S = 1 / 30
+EVERYWHERE = (-math.inf, math.inf)
+VIEW = (-0.8, 0.8)
+DEEPEST_M = 12.0
+
+Things = list[tuple[float, float]]
+"""Place and depth [m] of each."""
+
+
+def cross(
+    things: Things,
+    asides_m: np.ndarray,
+    *,
+    wires: Wires | None = None,
+    noise: float = 0.0,
+    hides: Callable[[int, int], bool] = lambda frame, k: False,
+) -> Wires:
+    """What is known after a way across; `hides` says whether a frame misses thing `k`."""
+    wires = wires or Wires(6.0, 4.5)
+    rng = np.random.default_rng(4)
+    for frame, aside_m in enumerate(asides_m.tolist()):
+        wires.forecast(FRAME_S, 0.0)
+        slopes = sorted(
+            slope + noise * rng.standard_normal()
+            for k, (place_m, depth_m) in enumerate(things)
+            if not hides(frame, k) and VIEW[0] < (slope := (place_m - aside_m) / depth_m) < VIEW[1]
+        )
+        wires.see(slopes, aside_m, VIEW, 0.0)
+        wires.choose_members(DEEPEST_M)
+    return wires
+
+
+WAY_M = np.arange(-8.0, 1.0, 0.08)
+THREE: Things = [(-0.8, 6.5), (0.0, 6.5), (0.8, 6.5)]
+
+
+@given(place_m=st.floats(-2.0, 2.0), depth_m=st.floats(3.0, 25.0))
+def test_a_way_across_tells_place_and_depth(place_m: float, depth_m: float) -> None:
+    (wire,) = cross([(place_m, depth_m)], WAY_M).all
+    assert wire.is_depth_known
+    assert wire.depth_m == pytest.approx(depth_m, rel=0.05)
+    assert wire.place_m == pytest.approx(place_m, abs=0.1)
+
+
+def test_a_short_way_tells_no_depth() -> None:
+    wires = cross(THREE, np.arange(-3.0, -2.7, 0.02))
+    assert len(wires.members) == 3
+    assert not wires.is_depth_known
+
+
+def test_the_middle_is_halfway_between_the_outermost_though_a_part_is_seen() -> None:
+    def hides(frame: int, k: int) -> bool:
+        return (frame + k) % 3 == 0
+
+    wires = cross(THREE, WAY_M, noise=0.01, hides=hides)
+    assert len(wires.members) == 3
+    assert wires.middle_m == pytest.approx(0.0, abs=0.08)
+
+
+def test_conductors_at_different_depths_have_a_common_middle() -> None:
+    """The apparent middle of what is in view is not it: a tower with one conductor above two."""
+    wires = cross([(-4.4, 23.0), (3.4, 18.5), (4.4, 23.0)], np.arange(-20.0, -2.0, 0.08), wires=Wires(16.0, 12.0))
+    wires.choose_members(26.0)
+    assert [wire.depth_m for wire in wires.members] == pytest.approx([23.0, 18.5, 23.0], rel=0.05)
+    assert wires.middle_m == pytest.approx(0.0, abs=0.2)
+
+
+def test_what_lies_on_the_ground_is_no_conductor() -> None:
+    wires = cross([*THREE, (2.2, 16.0)], WAY_M)
+    assert len(wires.all) == 4
+    assert [round(wire.place_m, 1) for wire in wires.members] == [-0.8, 0.0, 0.8]
+
+
+def test_what_is_seen_a_few_times_is_no_conductor_and_is_forgotten() -> None:
+    def hides(frame: int, k: int) -> bool:
+        return k == 3 and not 90 <= frame < 94
+
+    wires = cross([*THREE, (1.6, 6.5)], WAY_M, hides=hides)
+    assert len(wires.members) == 3
+    cross(THREE, np.full(100, 0.0), wires=wires)
+    assert len(wires.all) == 3
+
+
+def test_another_line_beside_is_another_one() -> None:
+    wires = cross([*THREE, (9.0, 6.5), (9.8, 6.5)], np.arange(-8.0, 6.0, 0.08))
+    assert len(wires.all) == 5
+    assert len(wires.members) in (2, 3)
+
+
+def test_a_conductor_that_is_hard_to_see_stays_one_for_a_while() -> None:
+    wires = cross(THREE, WAY_M)
+    cross(THREE, np.full(150, 0.0), wires=wires, hides=lambda frame, k: k == 0)
+    assert len(wires.members) == 3
+    cross(THREE, np.full(900, 0.0), wires=wires, hides=lambda frame, k: k == 0)
+    assert len(wires.members) == 2
+
+
+def test_once_settled_a_conductor_stays_one_however_deep_it_seems() -> None:
+    wires = cross(THREE, WAY_M)
+    wires.choose_members(3.0)
+    assert not wires.members
+    wires = cross(THREE, WAY_M)
+    wires.is_settled = True
+    wires.choose_members(3.0)
+    assert len(wires.members) == 3
+
+
+def test_a_drift_of_the_position_moves_what_is_out_of_view_as_well() -> None:
+    """The vehicle stands 3 m beside the line and sees two of three; its position drifts by 1 m in 10 s."""
+    wires = cross([(-4.0, 6.5), (0.0, 6.5), (4.0, 6.5)], np.arange(-10.0, 3.0, 0.08))
+    wires.is_settled = True
+    assert len(wires.members) == 3
+    for k in range(300):
+        wires.forecast(FRAME_S, 0.0)
+        wires.see([(place_m - 3.0) / 6.5 for place_m in (0.0, 4.0)], 3.0 + k / 300, VIEW, 0.0)
+        wires.choose_members(DEEPEST_M)
+    assert [wire.place_m for wire in wires.members] == pytest.approx([-3.0, 1.0, 5.0], abs=0.25)
+
+
+def test_after_a_gap_all_of_it_may_have_moved() -> None:
+    slopes = [(place_m + 1.2 - 0.5) / 6.5 for place_m in (-0.8, 0.0, 0.8)]
+    wires = cross(THREE, WAY_M)
+    assert not wires.see([slopes[2]], 0.5, VIEW, 0.0)
+    wires = cross(THREE, WAY_M)
+    seen = wires.see(slopes, 0.5, VIEW, 1.5)
+    assert sum(wire.is_member for wire in seen.values()) == 3
+    assert wires.middle_m == pytest.approx(1.2, abs=0.1)
+    wires = cross(THREE, WAY_M)
+    far = [slope + 3.0 / 6.5 for slope in slopes]
+    assert not any(wire.is_member for wire in wires.see(far, 0.5, EVERYWHERE, 1.5).values())
+
+
+def test_climbing_makes_it_deeper_where_it_is() -> None:
+    wire = Wire.at(0.1, 2.0, 6.0)
+    place_m = wire.place_m
+    wire.forecast(0.0, 3.0)
+    assert wire.depth_m == pytest.approx(9.0)
+    assert wire.place_m == pytest.approx(place_m)
