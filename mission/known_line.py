@@ -69,8 +69,8 @@ class View:
 class Found:
     """The line in a view. `is_placed` says whether its place counts, or its heading only.
 
-    `depth_m` is how far below the line is, where the way flown has told (None: not yet); `height_m` the same by the
-    spacing of the conductors, where all of them were seen and the mission tells it.
+    `depth_m` is how far below the line is, where the way flown has told that of all that seems to belong to it; None:
+    not yet. `height_m` is the same by the spacing of the conductors, where all were seen and the mission tells it.
     """
 
     line: WorldLine
@@ -154,7 +154,7 @@ class KnownLine:
             line,
             True,
             self._next_line(view),
-            wires.depth_m if wires.is_depth_known else None,
+            wires.depth_m if wires.is_complete else None,
             self._height_m([slopes[i] for i in sorted(here)], guidance),
         )
 

@@ -24,6 +24,7 @@ _ENOUGH_HITS = 5
 _DEPTH_HITS = 15  # texture may look like a wire for a few frames, at any depth
 _MEMBER_SHARE, _LOST_SHARE, _GONE_SHARE = 0.4, 0.15, 0.05
 _TENTATIVE_S = 2.0  # a wire of a few sights is forgotten when it is not seen for so long
+_IN_SIGHT_S = 0.5
 _MOST_WIRES = 24
 
 
@@ -68,6 +69,12 @@ class Wire:
     def is_depth_known(self) -> bool:
         """Whether the depth is more than supposed."""
         return self.n_hits >= _DEPTH_HITS and math.sqrt(self.var_rho) < _DEPTH_KNOWN * self.rho_per_m
+
+    @property
+    def is_undecided(self) -> bool:
+        """Whether it is in sight, and steadily so, but its depth is not known."""
+        is_steady = self.n_hits >= _DEPTH_HITS and self.share >= _MEMBER_SHARE
+        return is_steady and self.unseen_s < _IN_SIGHT_S and not self.is_depth_known
 
     def slope(self, aside_m: float) -> float:
         """The slope at which a vehicle there should see it."""
@@ -135,6 +142,16 @@ class Wires:
     def is_depth_known(self) -> bool:
         """Whether the depth of any conductor is known."""
         return any(wire.is_member and wire.is_depth_known for wire in self.all)
+
+    @property
+    def is_complete(self) -> bool:
+        """Whether the depth of the line is known, and of all that is in sight beside it and may belong to it."""
+        places_m = [wire.place_m for wire in self.all if wire.is_member]
+        return self.is_depth_known and not any(
+            min(abs(wire.place_m - place_m) for place_m in places_m) < self.gap_m
+            for wire in self.all
+            if not wire.is_member and wire.is_undecided
+        )
 
     def forecast(self, dt_s: float, climb_m: float) -> None:
         """Time passes, and the vehicle climbs."""

@@ -107,6 +107,17 @@ def test_a_conductor_that_is_hard_to_see_stays_one_for_a_while() -> None:
     assert len(wires.members) == 2
 
 
+def test_the_line_is_not_complete_while_the_depth_of_what_is_beside_it_is_not_known() -> None:
+    late = np.arange(-8.0, 0.0, 0.08)
+    wires = cross(THREE, late, hides=lambda frame, k: k == 2 and frame < 84)
+    assert len(wires.members) == 2
+    assert wires.is_depth_known
+    assert not wires.is_complete
+    cross(THREE, np.arange(0.0, 2.0, 0.08), wires=wires)
+    assert len(wires.members) == 3
+    assert wires.is_complete
+
+
 def test_once_settled_a_conductor_stays_one_however_deep_it_seems() -> None:
     wires = cross(THREE, WAY_M)
     wires.choose_members(3.0)
