@@ -26,6 +26,7 @@ def cross(
     wires: Wires | None = None,
     noise: float = 0.0,
     hides: Callable[[int, int], bool] = lambda frame, k: False,
+    deepest_m: float = DEEPEST_M,
 ) -> Wires:
     """What is known after a way across; `hides` says whether a frame misses thing `k`."""
     wires = wires or Wires(6.0, 4.5)
@@ -38,7 +39,7 @@ def cross(
             if not hides(frame, k) and VIEW[0] < (slope := (place_m - aside_m) / depth_m) < VIEW[1]
         )
         wires.see(slopes, aside_m, VIEW, 0.0)
-        wires.choose_members(DEEPEST_M)
+        wires.choose_members(deepest_m)
     return wires
 
 
@@ -71,8 +72,8 @@ def test_the_middle_is_halfway_between_the_outermost_though_a_part_is_seen() -> 
 
 def test_conductors_at_different_depths_have_a_common_middle() -> None:
     """The apparent middle of what is in view is not it: a tower with one conductor above two."""
-    wires = cross([(-4.4, 23.0), (3.4, 18.5), (4.4, 23.0)], np.arange(-20.0, -2.0, 0.08), wires=Wires(16.0, 12.0))
-    wires.choose_members(26.0)
+    things = [(-4.4, 23.0), (3.4, 18.5), (4.4, 23.0)]
+    wires = cross(things, np.arange(-20.0, -2.0, 0.08), wires=Wires(16.0, 12.0), deepest_m=28.0)
     assert [wire.depth_m for wire in wires.members] == pytest.approx([23.0, 18.5, 23.0], rel=0.05)
     assert wires.middle_m == pytest.approx(0.0, abs=0.2)
 
@@ -108,13 +109,19 @@ def test_a_conductor_that_is_hard_to_see_stays_one_for_a_while() -> None:
 
 
 def test_the_line_is_not_complete_while_the_depth_of_what_is_beside_it_is_not_known() -> None:
-    late = np.arange(-8.0, 0.0, 0.08)
-    wires = cross(THREE, late, hides=lambda frame, k: k == 2 and frame < 84)
-    assert len(wires.members) == 2
+    """High above a line, of which one conductor is found late, it takes some way to tell its depth."""
+    two: Things = [(-4.4, 23.0), (4.4, 23.0)]
+    way_m = np.arange(-16.0, -3.0, 0.08)
+    is_late = len(way_m) - 20
+    high = Wires(16.0, 12.0)
+    wires = cross(two, way_m, wires=high, hides=lambda frame, k: k == 1 and frame < is_late, deepest_m=28.0)
+    assert len(wires.members) == 1
     assert wires.is_depth_known
     assert not wires.is_complete
-    cross(THREE, np.arange(0.0, 2.0, 0.08), wires=wires)
-    assert len(wires.members) == 3
+    for aside_m in np.arange(-3.0, 2.0, 0.08).tolist():
+        wires.see([(place_m - aside_m) / depth_m for place_m, depth_m in two], aside_m, VIEW, 0.0)
+        wires.choose_members(28.0)
+    assert len(wires.members) == 2
     assert wires.is_complete
 
 
