@@ -21,6 +21,7 @@ from drivers.clock import NS_PER_S
 from mission.log.measures import nearest_on_axis
 from mission.log.reader import Flight, read_flight
 from mission.log.summary import summarise, task_spans, true_axis
+from mission.plan import FollowLines, MissionPlan
 from mission.plan_file import read_mission
 from mission.simulated.scenario import Scenario
 from mission.simulated.virtual_flight import fly_virtually
@@ -41,6 +42,7 @@ WINDS_M_S = (0.0, 4.0, 8.0, 12.0)
 OFF_THE_LINE = ("align", "follow_lines")
 WRONG_M = 3.0  # so far beside the line, and for so long, a vehicle that follows follows something else
 WRONG_S = 1.0
+LEAST_WAY = 0.8  # of the distance to follow, from end to end: less has turned back, or gone in circles
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,9 +75,9 @@ class Case:
 class Flown:
     """What came of a case; distances [m] are horizontal and to the true axis of the line, while following it.
 
-    `held` is the share of its frames that showed a line; `found_again_s` the longest time [s] that none was in
-    sight; `wrong_m` how far off the line the vehicle was for WRONG_S and more, 0 below WRONG_M; clearances are from the
-    vehicle's centre.
+    `held` is the share of its frames that showed the line; `found_again_s` the longest time [s] that it was not in
+    sight; `way` how far it came, as a share of the distances it was to follow; `wrong_m` how far off the line the
+    vehicle was for WRONG_S and more, 0 below WRONG_M; clearances are from the vehicle's centre.
     """
 
     world: str
@@ -89,6 +91,7 @@ class Flown:
     yaw_deg: float | None
     held: float | None
     found_again_s: float | None
+    way: float
     wrong_m: float
     conductor_m: float | None
     support_m: float | None
@@ -98,8 +101,19 @@ class Flown:
 
     @property
     def is_good(self) -> bool:
-        """Completed, on the right line, and nothing touched."""
-        return self.result == "completed" and self.contact is None and self.wrong_m == 0.0
+        """Completed, all along the right line, and nothing touched."""
+        is_along = self.wrong_m == 0.0 and self.way >= LEAST_WAY
+        return self.result == "completed" and self.contact is None and is_along
+
+    @property
+    def failing(self) -> str:
+        """What was wrong, in a few words."""
+        words = [f"{self.result}: {self.contact or self.reason}"]
+        if self.wrong_m:
+            words.append(f"{self.wrong_m:.1f} m off the line")
+        if self.way < LEAST_WAY:
+            words.append(f"came {100 * self.way:.0f} % of the way")
+        return "; ".join(words)
 
 
 def fly(case: Case) -> Flown:
@@ -120,6 +134,7 @@ def fly(case: Case) -> Flown:
         yaw_deg=None if report.yaw_error is None else report.yaw_error.median_deg,
         held=held,
         found_again_s=found_again_s,
+        way=way_along(flight, mission.plan),
         wrong_m=wrong_way_m(flight),
         conductor_m=clearance["conductor"],
         support_m=clearance["support"],
@@ -155,8 +170,22 @@ def wrong_way_m(flight: Flight) -> float:
     return worst
 
 
+def way_along(flight: Flight, plan: MissionPlan) -> float:
+    """How far the vehicle came while it followed, from end to end, as a share of what it was to follow: the least."""
+    end_ns, shares = flight.end_ns, []
+    spans = [span for span in task_spans(flight) if span.task == "follow_lines"]
+    for span, task in zip(spans, (task for task in plan.tasks if isinstance(task, FollowLines)), strict=False):
+        poses = [pose for pose in flight.truth if span.start_ns <= pose.t_ns <= (span.end_ns or end_ns)]
+        if poses:
+            ends = poses[0], poses[-1]
+            came_m = math.hypot(ends[1].north_m - ends[0].north_m, ends[1].east_m - ends[0].east_m)
+            shares.append(came_m / task.distance_m)
+    return min(shares, default=0.0)
+
+
 def sight_of_the_line(flight: Flight) -> tuple[float | None, float | None]:
     """The share of frames that showed the line while it was followed, and the longest time without [s]."""
+    fixed_ns = {fix.t_ns for fix in flight.fixes}
     n_frames = n_seen = 0
     longest_s = 0.0
     for span in task_spans(flight):
@@ -168,7 +197,7 @@ def sight_of_the_line(flight: Flight) -> tuple[float | None, float | None]:
                 continue
             n_frames += 1
             longest_s = max(longest_s, (report.t_capture_ns - last_ns) / NS_PER_S)
-            if report.estimate is not None:
+            if report.t_capture_ns in fixed_ns:
                 n_seen += 1
                 last_ns = report.t_capture_ns
     return (n_seen / n_frames, longest_s) if n_frames else (None, None)
@@ -219,7 +248,7 @@ COLUMNS = (
     "completed, on the line (Wilson 95 %)",
     "off the line, mean / p95 / max [m]",
     "heading error, median [deg]",
-    "frames with a line",
+    "frames with the line",
     "out of sight, longest [s]",
     "followed something else",
     "contacts",
@@ -261,8 +290,9 @@ def page(flights: list[Flown], note: str) -> str:
         "`make bench-following` regenerates this page. Each flight is a dry-run in virtual time with rendered frames "
         "and vision in the loop; wind is the mean at 20 ft with its Dryden gusts. All distances are to the simulated "
         f"truth, while aligning and following. A vehicle {WRONG_M:g} m off the line for {WRONG_S:g} s has followed "
-        f"something else; one that never got to align with the line has no distances. {len(flights)} flights, "
-        f"{speed:.1f} times real time each in the median, several at a time. {note}".rstrip(),
+        f"something else, one that came less than {100 * LEAST_WAY:.0f} % of the way has not followed; one that never "
+        f"got to align with the line has no distances. {len(flights)} flights, {speed:.1f} times real time each in the "
+        f"median, several at a time. {note}".rstrip(),
         "",
         *grouped("", calm, lambda flown: "all, up to 8 m/s"),
         "## By wind",
@@ -279,9 +309,7 @@ def page(flights: list[Flown], note: str) -> str:
     ]
     if not failures:
         lines.append("None.")
-    for flown in failures:
-        wrong = f"; {flown.wrong_m:.1f} m off the line" if flown.wrong_m else ""
-        lines.append(f"- {flown.result}: {flown.contact or flown.reason}{wrong}  \n  `{flown.command}`")
+    lines += [f"- {flown.failing}  \n  `{flown.command}`" for flown in failures]
     return "\n".join(lines) + "\n"
 
 
@@ -318,7 +346,7 @@ def main() -> None:
                 with options.keep.open("a", encoding="utf-8") as file:
                     file.write(json.dumps(asdict(flown)) + "\n")
             lateral = "-" if flown.lateral_m is None else "/".join(f"{value:.2f}" for value in flown.lateral_m)
-            words = "ok" if flown.is_good else f"{flown.result}: {flown.contact or flown.reason} {flown.wrong_m:.1f}"
+            words = "ok" if flown.is_good else flown.failing
             what = f"{flown.world} {flown.light} {flown.wind_m_s:g} m/s seed {flown.seed}"
             print(f"{len(flights)}/{len(cases)}  {what}  {lateral} m  {flown.speed:.1f}x  {words}", flush=True)
             options.out.write_text(page(in_order(flights), options.note), encoding="utf-8")

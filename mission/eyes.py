@@ -9,8 +9,8 @@ from drivers.camera.camera import Intrinsics
 from drivers.clock import NS_PER_S
 from mission.autopilot import VehicleState
 from mission.guidance import GuidanceSettings, bearing_of, wrap_angle_rad
-from mission.known_line import KnownLine, View
-from mission.records import Event, Severity
+from mission.known_line import Found, KnownLine, View
+from mission.records import Event, LineFix, Severity
 from mission.reporting import FlightLog
 from mission.tasks.task import Sight
 from vision.records import BLINDING, ImageLine, LineEstimate, VisionReport
@@ -163,6 +163,21 @@ def view_of(estimate: LineEstimate, state: VehicleState, camera: Intrinsics, gro
     )
 
 
+def fix_of(t_ns: int, found: Found) -> LineFix:
+    """What was found, for the log."""
+    line = found.line
+    return LineFix(
+        t_ns,
+        line.heading_rad,
+        line.north_m,
+        line.east_m,
+        found.is_placed,
+        found.n_conductors,
+        found.depth_m,
+        found.height_m,
+    )
+
+
 class Lookout:
     """Keeps what is needed to make a sight of each report.
 
@@ -200,6 +215,7 @@ class Lookout:
             self.sight_ns = max(self.sight_ns, sight.t_capture_ns)
             if sight.found is not None:
                 self.line_seen_ns = max(self.line_seen_ns, sight.t_capture_ns)
+                self._log.record(fix_of(sight.t_capture_ns, sight.found))
         return sight
 
     def keep_notices(self, now_ns: int) -> None:

@@ -67,13 +67,15 @@ class View:
 
 @dataclass(frozen=True, slots=True)
 class Found:
-    """The line in a view. `is_placed` says whether its place counts, or its heading only.
+    """The line in a view, of `n_conductors` as far as known.
 
-    `depth_m` is how far below the line is, where the way flown has told that of all that seems to belong to it; None:
-    not yet. `height_m` is the same by the spacing of the conductors, where all were seen and the mission tells it.
+    `is_placed` says whether its place counts, or its heading only. `depth_m` is how far below the line is, where the
+    way flown has told that of all that seems to belong to it; None: not yet. `height_m` is the same by the spacing of
+    the conductors, where all were seen and the mission tells it.
     """
 
     line: WorldLine
+    n_conductors: int
     is_placed: bool
     next_line: WorldLine | None
     depth_m: float | None
@@ -152,6 +154,7 @@ class KnownLine:
             line = self._axis.beside(middle_m)
         return Found(
             line,
+            max(1, len(wires.members)),
             True,
             self._next_line(view),
             wires.depth_m if wires.is_complete else None,
@@ -206,7 +209,7 @@ class KnownLine:
             return None
         if abs(wrap_line_angle_rad(view.next_span.heading_rad - axis.heading_rad)) > _STRAIGHT_RAD:
             return None
-        return Found(axis.beside(self._wires.middle_m or 0.0), False, None, None, None)
+        return Found(axis.beside(self._wires.middle_m or 0.0), len(self._wires.members), False, None, None, None)
 
 
 def _bundled(conductors: tuple[Bearing, ...]) -> tuple[Bearing, ...]:

@@ -81,6 +81,25 @@ class MissionEnded:
 
 
 @dataclass(frozen=True, slots=True)
+class LineFix:
+    """What a frame taken at `t_ns` told of the line that is looked for or followed (mission/known_line.py).
+
+    The line runs along `heading_rad` past `north_m`, `east_m`, abreast of the vehicle; `is_placed` says whether the
+    place counts, or the heading only. `n_conductors` are known of it, whether the frame showed them or not; `depth_m`
+    is how far below the vehicle it is by the way flown, `height_m` by the spacing, None where they do not tell.
+    """
+
+    t_ns: int
+    heading_rad: float
+    north_m: float
+    east_m: float
+    is_placed: bool
+    n_conductors: int
+    depth_m: float | None
+    height_m: float | None
+
+
+@dataclass(frozen=True, slots=True)
 class TruePose:
     """Where a simulated vehicle truly was: NED [m] from the world's origin, yaw [rad]."""
 

@@ -9,7 +9,7 @@ from drivers.clock import NS_PER_S
 from drivers.mcap_stream import IMAGE_TOPIC
 from mission.autopilot import VehicleState
 from mission.log.records import LoggedMission, SentSetpoint, StatusText, VisionEntry
-from mission.records import Event, MissionEnded, PreflightCheck, TaskEnded, TaskStarted, TrueLine, TruePose
+from mission.records import Event, LineFix, MissionEnded, PreflightCheck, TaskEnded, TaskStarted, TrueLine, TruePose
 
 PROFILE = "lineflight"
 
@@ -45,6 +45,7 @@ RECORD_CHANNELS = (
     RecordChannel("/vehicle/state", VehicleState, "the vehicle as telemetry tells it", "every control tick"),
     RecordChannel("/setpoint", SentSetpoint, "the offboard setpoints", "every control tick while offboard"),
     RecordChannel("/vision/report", VisionEntry, "line estimates and power lines", "every frame worked on"),
+    RecordChannel("/line", LineFix, "where the line is, as far as known", "every frame that showed it"),
     RecordChannel("/task/started", TaskStarted, "the executive entered a task", "on change"),
     RecordChannel("/task/ended", TaskEnded, "the executive left a task, and why", "on change"),
     RecordChannel("/mission/ended", MissionEnded, "how the flight ended", "once"),

@@ -14,7 +14,7 @@ from mission.autopilot import VehicleState
 from mission.log import channels
 from mission.log.errors import LogError
 from mission.log.records import LoggedMission, SentSetpoint, StatusText, VisionEntry
-from mission.records import Event, MissionEnded, PreflightCheck, TaskEnded, TaskStarted, TrueLine, TruePose
+from mission.records import Event, LineFix, MissionEnded, PreflightCheck, TaskEnded, TaskStarted, TrueLine, TruePose
 from vision.records import VisionReport
 
 
@@ -32,6 +32,7 @@ class Flight:
     states: tuple[VehicleState, ...]
     setpoints: tuple[SentSetpoint, ...]
     reports: tuple[VisionReport, ...]
+    fixes: tuple[LineFix, ...]
     tasks_started: tuple[TaskStarted, ...]
     tasks_ended: tuple[TaskEnded, ...]
     mission_ended: MissionEnded | None
@@ -100,6 +101,7 @@ def _flight(path: Path, streams: dict[type, list[Any]], jpegs: dict[int, bytes],
         states=tuple(streams[VehicleState]),
         setpoints=tuple(streams[SentSetpoint]),
         reports=tuple(_report(entry, jpegs.get(entry.t_ns + offset_ns)) for entry in streams[VisionEntry]),
+        fixes=tuple(streams[LineFix]),
         tasks_started=tuple(streams[TaskStarted]),
         tasks_ended=tuple(streams[TaskEnded]),
         mission_ended=ended[-1] if ended else None,

@@ -23,7 +23,17 @@ from mission.log.backlog import Backlog
 from mission.log.disk import LogFile
 from mission.log.records import LoggedMission, SentSetpoint, StatusText, VisionEntry
 from mission.log.wording import line_of
-from mission.records import Event, MissionEnded, PreflightCheck, Severity, TaskEnded, TaskStarted, TrueLine, TruePose
+from mission.records import (
+    Event,
+    LineFix,
+    MissionEnded,
+    PreflightCheck,
+    Severity,
+    TaskEnded,
+    TaskStarted,
+    TrueLine,
+    TruePose,
+)
 from vision.records import VisionReport
 
 _MAX_RECORDS = 20_000  # a minute or more of all streams
@@ -292,6 +302,7 @@ _WRITE: dict[type, Callable[[_FlightLog, Any], None]] = {
     MissionEnded: _FlightLog.write_worded,
     Event: _FlightLog.write_worded,
     StatusText: _FlightLog.write_worded,
+    LineFix: _FlightLog.write_plain,
     TruePose: _FlightLog.write_plain,
     TrueLine: _FlightLog.write_line,
 }

@@ -12,6 +12,7 @@ from mission.autopilot import FlightMode, LandedState, Setpoint, VehicleState
 from mission.log.recorder import Recorder
 from mission.records import (
     Event,
+    LineFix,
     MissionEnded,
     Result,
     Severity,
@@ -95,6 +96,11 @@ def fly(*, image_period_s: float = 4.0) -> Iterator[tuple[int, object]]:
                 yield t_ns + 1_000_000, Setpoint(north_m, east_m, down_m, yaw_rad)
             has_image = tick % round(image_period_s * NS_PER_S / TICK_NS) == round(image_period_s * 5)
             yield t_ns, see(seq, t_ns, (north_m, east_m, down_m, yaw_rad), has_image=has_image)
+            if seq % 2:
+                yield (
+                    t_ns,
+                    LineFix(t_ns, math.pi / 2, LINE_NORTH_M, east_m, True, 3, 6.0 if seq % 4 == 1 else None, None),
+                )
             seq += 1
             t_ns += TICK_NS
         pose = goal_pose

@@ -25,7 +25,7 @@ from mission.log.errors import LogError
 from mission.log.reader import Flight, read_flight
 from mission.log.recorder import Recorder
 from mission.log.records import SentSetpoint, StatusText
-from mission.records import Event, MissionEnded, PreflightCheck, Severity, TaskEnded, TaskStarted, TruePose
+from mission.records import Event, LineFix, MissionEnded, PreflightCheck, Severity, TaskEnded, TaskStarted, TruePose
 from mission.safety import Hazard, Reaction
 from tests.log import synthetic_flight
 from tests.log.synthetic_flight import LINE, MISSION_TEXT, START_NS, TICK_NS, FixedClock, fly, put_down, write_log
@@ -57,6 +57,7 @@ def test_every_record_comes_back_as_it_was(flown: list[tuple[int, object]], log:
     assert flight.tasks_ended == of_type(flown, TaskEnded)
     assert (flight.mission_ended,) == of_type(flown, MissionEnded)
     assert flight.events == of_type(flown, Event)
+    assert flight.fixes == of_type(flown, LineFix)
     assert flight.truth == of_type(flown, TruePose)
     assert flight.line == LINE
     sent = [(t_ns, item) for t_ns, item in flown if isinstance(item, Setpoint)]
@@ -123,6 +124,7 @@ st.register_type_strategy(float, st.floats(allow_nan=False, allow_infinity=False
     | st.builds(Event)
     | st.builds(StatusText)
     | st.builds(TruePose)
+    | st.builds(LineFix)
     | st.builds(PreflightCheck)
 )
 def test_any_record_survives_json(record: object) -> None:

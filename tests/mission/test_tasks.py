@@ -36,7 +36,7 @@ def sight(
     depth_m: float | None = 6.0,
     height_m: float | None = None,
 ) -> Sight:
-    found = None if line is None else Found(line, is_placed, next_line, depth_m, height_m)
+    found = None if line is None else Found(line, 3, is_placed, next_line, depth_m, height_m)
     return Sight(0, yaw_rad, at.north_m, at.east_m, at.down_m, found)
 
 
