@@ -18,6 +18,7 @@ MAX_TURN_RAD = math.radians(70.0)  # angle supports turn by 60 degrees and littl
 _MIN_SHARE = 0.15  # of its chord that a span has in the frame, for there to be something to judge
 _OVERLAP = 0.04  # share of the diagonal by which a conductor may go on beyond the bend
 _MOST_OVERLAP = 3.0  # times that, for the middle one
+_MOST_DIRECTIONS = 3  # that are tried for the other span: a pole's shadow may be clearer
 _LOOSE = 0.5  # of the support that a line across the frame must have: one that ends is often taken for longer
 
 
@@ -57,14 +58,34 @@ def find_bend(
     if not group:
         return None
     one = _span(group, shape)
-    is_other = line_angle_distance_rad(np.array([c.angle_rad for c in conductors]), one.angle_rad) >= MIN_TURN_RAD
-    rest = [conductor for conductor, keeps in zip(conductors, is_other, strict=True) if keeps]
-    others, _ = choose_group(rest, tolerance_rad, _LOOSE * min_support, min_contrast)
-    if not others or abs(len(others) - len(group)) > 1:
-        return None
-    other = _span(others, shape)
-    if max(c.contrast for c in others) < min_contrast * max(c.contrast for c in group):
-        return None
+    rest = _apart_from(conductors, one.angle_rad)
+    for _ in range(_MOST_DIRECTIONS):
+        others, _ = choose_group(rest, tolerance_rad, _LOOSE * min_support, min_contrast)
+        if not others:
+            return None
+        other = _span(others, shape)
+        if _may_go_on(others, group, min_contrast):
+            found = _meeting_spans(one, other, shape)
+            if found is not None:
+                return found
+        rest = _apart_from(rest, other.angle_rad)
+    return None
+
+
+def _apart_from(conductors: list[Conductor], angle_rad: float) -> list[Conductor]:
+    """Those that run in another direction."""
+    is_other = line_angle_distance_rad(np.array([c.angle_rad for c in conductors]), angle_rad) >= MIN_TURN_RAD
+    return [conductor for conductor, keeps in zip(conductors, is_other, strict=True) if keeps]
+
+
+def _may_go_on(others: list[Conductor], group: list[Conductor], min_contrast: float) -> bool:
+    """Whether a group may be of the same conductors: as many, but for one, but not one alone; as clear."""
+    is_as_many = abs(len(others) - len(group)) <= 1 and len(others) >= min(2, len(group))
+    return is_as_many and max(c.contrast for c in others) >= min_contrast * max(c.contrast for c in group)
+
+
+def _meeting_spans(one: Span, other: Span, shape: tuple[int, int]) -> Bend | None:
+    """The bend of two spans, where they meet in the frame and end there."""
     meeting = _meet(one, other, shape)
     if meeting is None:
         return None

@@ -153,7 +153,7 @@ class LineFinder:
             # Without a conductor the longest edges say which way the image runs.
             weights = (edges.coherence * edges.covered_px) ** 2
             peak_rad = main_angle_rad(segment_angles_rad(edges.segments), weights)
-            return Detection(segments, power_lines, peak_rad, 0.0, 0, None, 0.0, False)
+            return Detection(segments, power_lines, peak_rad, 0.0, 0, None, 0.0, 0.0)
         next_span = None if bend is None else ImageLine(bend.beyond.angle_rad, bend.beyond.offset_px)
         return self._judge(segments, power_lines, group, beyond, next_span, shape)
 
@@ -168,8 +168,8 @@ class LineFinder:
     ) -> Detection:
         """Say from the conductors, here and beyond a bend, whether there is a power line, and where its middle runs."""
         settings = self._settings
-        is_present = any(
-            c.support >= max(settings.presence_min_support, settings.presence_min_sigmas / math.sqrt(c.length_px))
+        presence = max(
+            c.support / max(settings.presence_min_support, settings.presence_min_sigmas / math.sqrt(c.length_px))
             for c in (*group, *beyond)
         )
         angle_rad = mean_line_angle_rad(
@@ -185,8 +185,8 @@ class LineFinder:
             middle_offset_px(group, angle_rad, shape),
             len(row),
             spacing_px(row, angle_rad, shape),
-            confidence if is_present else min(confidence, settings.presence_min_support),
-            is_present,
+            confidence if presence >= 1.0 else min(confidence, settings.presence_min_support),
+            presence,
             next_span,
             one_by_one(row, angle_rad, shape),
         )

@@ -47,6 +47,8 @@ class LineEstimate:
     pixels are those of the undistorted image. `conductors` are those that one cut across the group meets, one by one
     from left to right; a source that does not tell them apart leaves it empty. Where the line bends in view, all of it
     is about the span abreast of the image centre, and `next_span` is the middle of the other one.
+    `presence` says how surely there is a line at all: below 1 a frame by itself is not enough, and the estimate counts
+    only where it goes on with a line that was there a moment ago (vision.tracking).
     """
 
     angle_rad: float
@@ -57,6 +59,7 @@ class LineEstimate:
     t_capture_ns: int
     next_span: ImageLine | None = None
     conductors: tuple[ImageLine, ...] = ()
+    presence: float = 1.0
 
     @property
     def middle(self) -> ImageLine:
@@ -80,13 +83,18 @@ class Detection:
     n_lines: int
     spacing_px: float | None
     confidence: float
-    is_present: bool
+    presence: float
     next_span: ImageLine | None = None
     conductors: tuple[ImageLine, ...] = ()
 
+    @property
+    def is_present(self) -> bool:
+        """Whether the frame by itself shows a power line."""
+        return self.presence >= 1.0
+
     def estimate(self, t_capture_ns: int) -> LineEstimate | None:
-        """The estimate that guidance gets for a frame taken at `t_capture_ns`: None where no line is present."""
-        if not self.is_present or self.angle_rad is None:
+        """The estimate of a frame taken at `t_capture_ns`: None where there is no conductor."""
+        if self.presence <= 0.0 or self.angle_rad is None:
             return None
         return LineEstimate(
             self.angle_rad,
@@ -97,6 +105,7 @@ class Detection:
             t_capture_ns,
             self.next_span,
             self.conductors,
+            self.presence,
         )
 
 

@@ -1,6 +1,7 @@
 """The line over time: which estimates go on where the last one was, and whether the line is being tracked or lost.
 
-One frame may show a fence for the line, or a part of the group. A vehicle turns and drifts only so fast, so an estimate
+One frame may show a fence for the line, or a part of the group; and where a line was a moment ago, less is enough to go
+on with it than it takes to find one. A vehicle turns and drifts only so fast, so an estimate
 that jumps is withheld until the next frames say the same. Nothing is smoothed and nothing is made up: what comes out is
 the frame's own estimate, or None.
 """
@@ -28,6 +29,8 @@ class TrackSettings:
     n_confirm: int = 2  # frames in a row that agree, before a line is tracked
     n_jump: int = 5  # frames in a row that agree on another place, before the track moves there
     lost_after_s: float = 1.0
+    hold_presence: float = 0.65  # of a frame that goes on with the track, in place of the 1 that a line needs by itself
+    hold_s: float = 1.0  # at most for so long
 
 
 class LineTracker:
@@ -40,6 +43,7 @@ class LineTracker:
         self._n_agreeing = 0
         self._has_tracked = False
         self._last_frame_ns = 0
+        self._last_present_ns = 0
 
     def update(
         self, estimate: LineEstimate | None, t_capture_ns: int, diagonal_px: float
@@ -51,14 +55,21 @@ class LineTracker:
         self._last_frame_ns = t_capture_ns
         if tracked is not None and not was_in_last_frame and elapsed_s(tracked, t_capture_ns) > settings.lost_after_s:
             self._tracked = tracked = None
-        if estimate is None:
-            self._candidate, self._n_agreeing = None, 0
-            return self._without(), None
         is_recent = tracked is not None and (
             was_in_last_frame or elapsed_s(tracked, t_capture_ns) <= settings.max_gap_s
         )
-        if tracked is not None and is_recent and self._agrees(tracked, estimate, diagonal_px):
+        goes_on = (
+            estimate is not None
+            and tracked is not None
+            and is_recent
+            and self._agrees(tracked, estimate, diagonal_px)
+            and (estimate.presence >= 1.0 or self._may_hold(estimate))
+        )
+        if estimate is not None and goes_on:
             return self._accept(estimate)
+        if estimate is None or estimate.presence < 1.0:
+            self._candidate, self._n_agreeing = None, 0
+            return self._without(), None
         is_again = self._candidate is not None and self._agrees(self._candidate, estimate, diagonal_px)
         self._candidate = estimate
         self._n_agreeing = self._n_agreeing + 1 if is_again else 1
@@ -66,7 +77,14 @@ class LineTracker:
             return self._accept(estimate)
         return self._without(), None
 
+    def _may_hold(self, estimate: LineEstimate) -> bool:
+        """Whether an estimate is sure enough to go on with what is tracked."""
+        held_s = max(0, estimate.t_capture_ns - self._last_present_ns) / NS_PER_S
+        return estimate.presence >= self._settings.hold_presence and held_s <= self._settings.hold_s
+
     def _accept(self, estimate: LineEstimate) -> tuple[Track, LineEstimate]:
+        if estimate.presence >= 1.0:
+            self._last_present_ns = estimate.t_capture_ns
         self._tracked, self._has_tracked = estimate, True
         self._candidate, self._n_agreeing = None, 0
         return Track.TRACKING, estimate

@@ -21,6 +21,7 @@ _SLOWEST = 0.25  # of r
 _STRAIGHT_RAD = math.radians(5.0)  # a turn that is left and takes no speed away
 _TURN_RAD = math.radians(25.0)  # and over which it does
 _PICK_UP_S = 1.5
+_ONTO_SPAN = 2.0  # of r: how fast the setpoint goes sideways onto the span beyond a bend
 _FRAME_S = 0.15  # between the frames of a slow camera the line is not unseen
 
 
@@ -83,7 +84,9 @@ class FollowLinesTask:
                 self._spans.line,
                 course_rad,
                 guidance.lateral_per_s,
-                guidance.r_m_s if self._spans.is_turning(self._odometer.moved_m) else guidance.lateral_max_m_s,
+                _ONTO_SPAN * guidance.r_m_s
+                if self._spans.is_turning(self._odometer.moved_m)
+                else guidance.lateral_max_m_s,
                 seen.dt_s,
                 beyond_m=guidance.lateral_lead * vehicle_off_m,
             )

@@ -68,11 +68,16 @@ class SpanChoice:
         if not spans:
             if unseen_s <= _DOUBT_S:
                 return False
-            self._left, spans = None, in_sight
+            self._left, self.line, spans = None, None, in_sight  # there was no bend
         spans.sort(key=lambda span: abs(wrap_line_angle_rad(span.heading_rad - target_rad)))
+        self.bend_m = None
+        turn_rad = abs(wrap_line_angle_rad(spans[0].heading_rad - target_rad))
+        if len(spans) == 1 and turn_rad > _SAME_RAD and self.line is not None:
+            # The vehicle has flown past a bend that it did not see: nothing but the span beyond it is in view.
+            self._approach(reference, sight, self.line, spans[0], moved_m, is_passed=True)
+            return True
         is_bent = found.next_line is not None
         self.take(spans[0], target_rad, is_place_sure=found.is_placed or is_bent)
-        self.bend_m = None
         if len(spans) == 2:
             self._approach(reference, sight, spans[0], spans[1], moved_m, is_passed=spans[0] is not line)
         return True

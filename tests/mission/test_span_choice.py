@@ -66,6 +66,18 @@ def test_the_span_before_a_bend_does_not_count_until_there_was_none() -> None:
     assert not spans.is_turning(10.5)
 
 
+def test_a_span_that_alone_is_in_view_is_turned_to_when_two_sights_agree_and_the_one_before_it_is_left() -> None:
+    """The bend passed below unseen: so a sight of both is no bend back."""
+    spans = on_its_way()
+    ahead, beyond = replace(UP, north_m=2.5), WorldLine(math.radians(30.0), 1.0, 0.0)
+    assert spans.see(ahead, sight(beyond, at=ahead), 10.0, 0.0)
+    assert spans.target_rad == 0.0
+    assert spans.see(ahead, sight(beyond, at=ahead), 10.0, 0.0)
+    for _ in range(6):
+        assert spans.target_rad == pytest.approx(math.radians(30.0))
+        assert spans.see(ahead, sight(beyond, at=ahead, next_line=HERE), 10.2, 0.0)
+
+
 def hold(n_ticks: int, heights_m: dict[int, float], hold_of: HeightHold, start: Setpoint = UP) -> Setpoint:
     """A vehicle at its setpoint that sees the line so far below at those ticks."""
     setpoint = start

@@ -1,6 +1,7 @@
 """The line over time: jumps are withheld, what repeats itself is believed, and a line that is gone is said to be."""
 
 import math
+from dataclasses import replace
 
 import pytest
 from hypothesis import given
@@ -24,9 +25,7 @@ def track(estimates: list[LineEstimate | None], period_ns: int = PERIOD_NS) -> l
     for seq, estimate in enumerate(estimates):
         t_ns = seq * period_ns
         if estimate is not None:
-            estimate = LineEstimate(
-                estimate.angle_rad, estimate.offset_px, estimate.n_lines, estimate.spacing_px, 0.9, t_ns
-            )
+            estimate = replace(estimate, t_capture_ns=t_ns)
         state, counted = tracker.update(estimate, t_ns, DIAGONAL_PX)
         assert counted is None or counted == estimate  # nothing is made up
         answers.append((state, counted is not None))
@@ -49,6 +48,23 @@ def test_one_frame_alone_never_counts() -> None:
 @pytest.mark.parametrize("jump", [at(40), at(10, 200.0), at(100)])
 def test_a_jump_is_withheld_and_the_line_goes_on_where_it_was(jump: LineEstimate) -> None:
     assert track([at(10), at(10), jump, at(11)]) == [SEARCHING, TRACKING, DOUBTFUL, TRACKING]
+
+
+WEAK = replace(at(10), presence=0.8)
+
+
+def test_where_a_line_was_a_moment_ago_less_is_enough_to_go_on_with_it() -> None:
+    assert track([at(10), at(10), WEAK, WEAK, at(11)]) == [SEARCHING, *[TRACKING] * 4]
+    assert track([WEAK] * 5) == [SEARCHING] * 5
+    assert track([at(10), at(10), replace(WEAK, presence=0.5)])[-1] == DOUBTFUL
+    assert not any(counts for _, counts in track([at(10), at(10), *[replace(at(80), presence=0.9)] * 8])[2:])
+
+
+def test_it_is_not_enough_for_ever() -> None:
+    answers = track([at(10), at(10), *[WEAK] * 70])
+    assert answers[20] == TRACKING
+    assert answers[40] == DOUBTFUL
+    assert answers[-1] == LOST
 
 
 def test_a_jump_that_repeats_itself_is_believed() -> None:
