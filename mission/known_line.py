@@ -23,8 +23,8 @@ _OUT_OF_SIGHT_S = 0.5  # after which the line may be somewhat elsewhere
 _TOLERANCE_M = 1.5  # what the estimates of place and height err by then
 _DRIFT_M_S = 0.2  # the position may drift so fast while the line is out of sight
 _MOST_M = 4.0
-_ABOVE_GROUND = 0.85  # share of the height over the take-off point: what is further below than that lies on the ground
-_TOO_DEEP = 2.0  # of the planned height over the line: what is further below than that is something else
+ABOVE_GROUND = 0.85  # share of the height over the take-off point: what is further below than that lies on the ground
+TOO_DEEP = 2.0  # of the planned height over the line: what is further below than that is something else
 _N_ELSEWHERE = 3  # sights of another direction, before that is the one looked at
 _GAP = 0.75  # share of the planned height: conductors of one line are less far apart
 _BUNDLE = 0.04  # wires closer than this slope are one conductor: a bundle's are 0.4 m apart
@@ -134,7 +134,7 @@ class KnownLine:
         aside_m = -axis.offset_m(view.north_m, view.east_m, axis.heading_rad)
         slopes = [conductor.slope for conductor in view.conductors]
         seen = wires.see(slopes, aside_m, view.in_view, self._slack_m(view.t_ns))
-        wires.choose_members(min(_ABOVE_GROUND * view.ground_m, _TOO_DEEP * guidance.height_over_line_m))
+        wires.choose_members(min(ABOVE_GROUND * view.ground_m, TOO_DEEP * guidance.height_over_line_m))
         here = {i: wire for i, wire in seen.items() if wire.is_member}
         if not here and (self.is_begun or wires.members):
             return None
@@ -178,7 +178,7 @@ class KnownLine:
         height_m = spacing_m / statistics.median(b - a for a, b in itertools.pairwise(slopes))
         if wires.is_depth_known and abs(height_m - wires.depth_m) > _DEPTH_AGREES * wires.depth_m:
             return None
-        return height_m if 0.5 * planned_m <= height_m <= _TOO_DEEP * planned_m else None
+        return height_m if 0.5 * planned_m <= height_m <= TOO_DEEP * planned_m else None
 
     def _turns(self, view: View, axis: WorldLine, guidance: GuidanceSettings) -> bool:
         """Whether a view of another direction is of the next span, or of what is looked at from now on."""

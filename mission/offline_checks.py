@@ -3,14 +3,24 @@
 from mission.checks import Check, failed, passed, warning
 from mission.estimate import FlightTotals, estimate_mission, total
 from mission.geofence import nearest_edge_m
-from mission.plan import MissionPlan
+from mission.known_line import ABOVE_GROUND, TOO_DEEP
+from mission.plan import Align, FollowLines, MissionPlan, MoveUntil
 from mission.reach import reckon
+
+_ROUGHLY = 1.3
+"""guidance.height_over_line_m may be so much less than what the heights say before it is worth a word."""
 
 
 def check_offline(plan: MissionPlan) -> list[Check]:
     """Every check that needs the mission alone."""
     totals = total(plan)
-    return [_time_limits(plan), _energy(plan, totals), _fence(plan, totals), _line_height(plan)]
+    return [
+        _time_limits(plan),
+        _energy(plan, totals),
+        _fence(plan, totals),
+        _line_height(plan),
+        _height_over_line(plan),
+    ]
 
 
 def _time_limits(plan: MissionPlan) -> Check:
@@ -55,3 +65,33 @@ def _line_height(plan: MissionPlan) -> Check:
         return passed("line_height", "not checked: safety.line_height_m is not given")
     room_m = min(over_m) - safety.line_height_m
     return passed("line_height", f"at least {room_m:.1f} m over the line of {safety.line_height_m:g} m")
+
+
+def _height_over_line(plan: MissionPlan) -> Check:
+    """Whether guidance.height_over_line_m can be: by it offsets become metres, and the line is told from the ground."""
+    name, planned_m, line_m = "height_over_line", plan.guidance.height_over_line_m, plan.safety.line_height_m
+    looking = (MoveUntil, Align, FollowLines)
+    highest_m = max(
+        (leg.lowest_m for leg, task in zip(reckon(plan), plan.tasks, strict=True) if isinstance(task, looking)),
+        default=None,
+    )
+    if highest_m is None:
+        return passed(name, "the mission does not look for a line")
+    words = f"guidance.height_over_line_m is {planned_m:g}"
+    if planned_m > ABOVE_GROUND * highest_m:
+        return failed(name, f"{words}, but the mission flies {highest_m:g} m high: that is not a line but the ground")
+    if line_m is None:
+        return passed(name, f"{words}; not compared, as safety.line_height_m is not given")
+    over_m = highest_m - line_m
+    if over_m > TOO_DEEP * planned_m:
+        return failed(
+            name,
+            f"{words}, but the mission flies {over_m:.1f} m over safety.line_height_m or more: what is more than "
+            f"{TOO_DEEP:g} times as deep is not taken for the line; give about {over_m:.0f}",
+        )
+    if over_m > _ROUGHLY * planned_m:
+        return warning(
+            name,
+            f"{words}, but the mission flies {over_m:.1f} m over safety.line_height_m or more: give about {over_m:.0f}",
+        )
+    return passed(name, f"{words}, and the mission flies at least {over_m:.1f} m over the line")
