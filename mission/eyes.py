@@ -199,24 +199,24 @@ class Lookout:
         self.line_seen_ns = max(self.line_seen_ns, now_ns)
 
     def look(self, now_ns: int, state: VehicleState, known: KnownLine, ground_m: float) -> Sight | None:
-        """The newest report since the last look, on the map; the older ones are kept in the log alone.
+        """The newest report since the last look, on the map; those before it only make the line better known.
 
         The vehicle is `ground_m` above the take-off point.
         """
         self._history.add(state)
         self.keep_notices(now_ns)
-        reports = self._eyes.take()
-        for report in reports:
+        newest = None
+        for report in self._eyes.take():
             self._log.record(report)
-        if not reports:
-            return None
-        sight = sight_of(reports[-1], self._history, known, self._camera, self._guidance, ground_m, now_ns)
-        if sight is not None:
+            sight = sight_of(report, self._history, known, self._camera, self._guidance, ground_m, now_ns)
+            newest = sight or newest
+            if sight is None:
+                continue
             self.sight_ns = max(self.sight_ns, sight.t_capture_ns)
             if sight.found is not None:
                 self.line_seen_ns = max(self.line_seen_ns, sight.t_capture_ns)
                 self._log.record(fix_of(sight.t_capture_ns, sight.found))
-        return sight
+        return newest
 
     def keep_notices(self, now_ns: int) -> None:
         """Put into the log what happened to the eyes."""

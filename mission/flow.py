@@ -188,6 +188,7 @@ class Flow:
         self.detour = None
         self._situation.expect_line(now_ns)
         if was_rejoining:
+            self._situation.memory.known_line.forget()  # the vehicle has come down to it
             self.start_task()
         else:
             self._log.record(Event(now_ns, "carried_on", Severity.INFO, words))

@@ -8,10 +8,10 @@ At an angle support it turns, but the new span begins where the old one ends.
 import itertools
 import math
 import statistics
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from drivers.clock import NS_PER_S
-from mission.guidance import Bearing, GuidanceSettings, WorldLine
+from mission.guidance import Bearing, GuidanceSettings, WorldLine, wrap_angle_rad
 from mission.wires import Wires
 from vision.records import wrap_line_angle_rad
 
@@ -26,8 +26,11 @@ _MOST_M = 4.0
 ABOVE_GROUND = 0.85  # share of the height over the take-off point: what is further below than that lies on the ground
 TOO_DEEP = 2.0  # of the planned height over the line: what is further below than that is something else
 _N_ELSEWHERE = 3  # sights of another direction, before that is the one looked at
+_GONE_S = 2.0  # a line that is not surely one, or that is not followed yet, is given up when it is not seen for so long
+_SAME_RAD, _AGAIN_S = 0.2, 0.5  # two views of one span beyond a bend differ by less
 _GAP = 0.75  # share of the planned height: conductors of one line are less far apart
 _BUNDLE = 0.04  # wires closer than this slope are one conductor: a bundle's are 0.4 m apart
+_WIDEST_BUNDLE, _MOST_CONDUCTORS = 0.12, 18  # what is more are the rows of a field, which pass for each other
 _DEPTH_AGREES = 0.35  # share by which the height that the spacing tells may differ from what the way flown has told
 
 
@@ -52,16 +55,11 @@ class View:
         """The same for one who looks along the line's other heading, where that is nearer to `heading_rad`."""
         middle = self.middle.along(heading_rad)
         is_same = math.cos(middle.heading_rad - self.middle.heading_rad) > 0.0
-        return View(
-            self.t_ns,
-            self.north_m,
-            self.east_m,
-            self.down_m,
-            self.ground_m,
-            middle,
-            _bundled(tuple(conductor.along(heading_rad) for conductor in self.conductors)),
-            self.in_view if is_same else (-self.in_view[1], -self.in_view[0]),
-            self.next_span,
+        return replace(
+            self,
+            middle=middle,
+            conductors=tuple(conductor.along(heading_rad) for conductor in self.conductors),
+            in_view=self.in_view if is_same else (-self.in_view[1], -self.in_view[0]),
         )
 
 
@@ -87,7 +85,7 @@ class KnownLine:
     """What was seen of the line so far; nothing before a first view.
 
     While a flight looks for its line, whatever may be one is; from `begin` on there is one that is followed, and
-    nothing else counts.
+    nothing counts but what may be its conductors, or a span that it goes on in.
     """
 
     is_begun: bool = False
@@ -97,6 +95,7 @@ class KnownLine:
     _last_ns: int = 0
     _last_down_m: float = 0.0
     _n_elsewhere: int = 0
+    _turned: tuple[int, float] = (0, 0.0)
 
     def forget(self) -> None:
         """Look for any line."""
@@ -115,7 +114,13 @@ class KnownLine:
         self._last_ns, self._last_down_m = max(view.t_ns, self._last_ns), view.down_m
         axis = self._axis or view.middle.line(view.north_m, view.east_m, guidance.height_over_line_m)
         view = view.along(axis.heading_rad)
-        if abs(wrap_line_angle_rad(view.middle.heading_rad - axis.heading_rad)) > _STRAIGHT_RAD:
+        if _is_field(view.conductors):
+            return None
+        view = replace(view, conductors=_one_each(view.conductors))
+        if self._is_gone(view.t_ns):
+            self._start(view, guidance)
+            axis = self._axis or axis
+        elif abs(wrap_line_angle_rad(view.middle.heading_rad - axis.heading_rad)) > _STRAIGHT_RAD:
             if not self._turns(view, axis, guidance):
                 return self._beyond(view, axis)
             axis = self._axis or axis
@@ -126,7 +131,12 @@ class KnownLine:
     def _start(self, view: View, guidance: GuidanceSettings) -> None:
         self._axis = view.middle.line(view.north_m, view.east_m, guidance.height_over_line_m)
         self._wires = Wires(guidance.height_over_line_m, _GAP * guidance.height_over_line_m)
+        self._wires.is_settled = self.is_begun
         self._last_ns, self._last_down_m, self._seen_ns = view.t_ns, view.down_m, view.t_ns
+
+    def _is_gone(self, t_ns: int) -> bool:
+        """Whether what is followed was hardly a line: one of which the depth is not known, not seen for a while."""
+        return self.is_begun and not self._wires.is_sure and t_ns - self._seen_ns > _GONE_S * NS_PER_S
 
     def _find(self, view: View, axis: WorldLine, guidance: GuidanceSettings) -> Found | None:
         """The line in a view of the same direction."""
@@ -144,7 +154,7 @@ class KnownLine:
         if here:
             self._seen_ns = view.t_ns
             turns_rad = [wrap_line_angle_rad(view.conductors[i].heading_rad - axis.heading_rad) for i in here]
-            heading_rad = axis.heading_rad + statistics.fmean(turns_rad)
+            heading_rad = wrap_angle_rad(axis.heading_rad + statistics.fmean(turns_rad))
         abreast = WorldLine(axis.heading_rad, view.north_m, view.east_m).beside(-aside_m)
         self._axis = WorldLine(heading_rad, abreast.north_m, abreast.east_m)
         middle_m = wires.middle_m
@@ -152,13 +162,16 @@ class KnownLine:
             line = view.middle.line(view.north_m, view.east_m, wires.depth_m)
         else:
             line = self._axis.beside(middle_m)
+        height_m = self._height_m([slopes[i] for i in sorted(here)], guidance)
+        if height_m is not None and self.is_begun:
+            wires.learn_depth(height_m)
         return Found(
             line,
             max(1, len(wires.members)),
             True,
             self._next_line(view),
             wires.depth_m if wires.is_complete else None,
-            self._height_m([slopes[i] for i in sorted(here)], guidance),
+            height_m,
         )
 
     def _next_line(self, view: View) -> WorldLine | None:
@@ -176,7 +189,8 @@ class KnownLine:
         if spacing_m is None or len(slopes) < 2 or len(slopes) != len(wires.members):
             return None
         height_m = spacing_m / statistics.median(b - a for a, b in itertools.pairwise(slopes))
-        if wires.is_depth_known and abs(height_m - wires.depth_m) > _DEPTH_AGREES * wires.depth_m:
+        is_other = abs(height_m - wires.depth_m) > _DEPTH_AGREES * wires.depth_m
+        if is_other and wires.is_depth_known and not self.is_begun:  # later on the spacing is the better witness
             return None
         return height_m if 0.5 * planned_m <= height_m <= TOO_DEEP * planned_m else None
 
@@ -184,7 +198,8 @@ class KnownLine:
         """Whether a view of another direction is of the next span, or of what is looked at from now on."""
         if not self.is_begun:
             self._n_elsewhere += 1
-            if self._n_elsewhere < _N_ELSEWHERE or self._wires.is_depth_known:
+            is_kept = self._wires.is_depth_known and view.t_ns - self._seen_ns < _GONE_S * NS_PER_S
+            if self._n_elsewhere < _N_ELSEWHERE or is_kept:
                 return False
             self._n_elsewhere = 0
             self._start(view, guidance)
@@ -200,6 +215,11 @@ class KnownLine:
             _MOST_AWAY_M, _AWAY_M + part_m + 3.0 * drift_m
         ):
             return False
+        seen_ns, heading_rad = self._turned
+        self._turned = (view.t_ns, span.heading_rad)
+        is_again = abs(wrap_line_angle_rad(span.heading_rad - heading_rad)) < _SAME_RAD
+        if not is_again or view.t_ns - seen_ns > _AGAIN_S * NS_PER_S:
+            return False
         self._axis = span.beside(-middle_m)
         return True
 
@@ -212,19 +232,28 @@ class KnownLine:
         return Found(axis.beside(self._wires.middle_m or 0.0), len(self._wires.members), False, None, None, None)
 
 
-def _bundled(conductors: tuple[Bearing, ...]) -> tuple[Bearing, ...]:
-    """The conductors from left to right, the wires of one bundle as one."""
+def _bundles(conductors: tuple[Bearing, ...]) -> list[list[Bearing]]:
+    """The conductors from left to right, those of one bundle together."""
     bundles: list[list[Bearing]] = []
     for conductor in sorted(conductors, key=lambda conductor: conductor.slope):
         if bundles and conductor.slope - bundles[-1][-1].slope < _BUNDLE:
             bundles[-1].append(conductor)
         else:
             bundles.append([conductor])
-    return tuple(
-        Bearing(
-            bundle[0].heading_rad
-            + statistics.fmean(wrap_line_angle_rad(one.heading_rad - bundle[0].heading_rad) for one in bundle),
-            statistics.fmean(one.slope for one in bundle),
-        )
-        for bundle in bundles
-    )
+    return bundles
+
+
+def _is_field(conductors: tuple[Bearing, ...]) -> bool:
+    """Whether they are too many side by side to be those of a line."""
+    bundles = _bundles(conductors)
+    return len(bundles) > _MOST_CONDUCTORS or any(b[-1].slope - b[0].slope > _WIDEST_BUNDLE for b in bundles)
+
+
+def _one_each(conductors: tuple[Bearing, ...]) -> tuple[Bearing, ...]:
+    """The conductors from left to right, the wires of one bundle as one."""
+    merged = []
+    for bundle in _bundles(conductors):
+        first_rad = bundle[0].heading_rad
+        turn_rad = statistics.fmean(wrap_line_angle_rad(one.heading_rad - first_rad) for one in bundle)
+        merged.append(Bearing(first_rad + turn_rad, statistics.fmean(one.slope for one in bundle)))
+    return tuple(merged)

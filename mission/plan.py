@@ -215,7 +215,8 @@ class GuidancePlan(_Section):
         6.0,
         gt=0,
         le=100,
-        description="Roughly; scales the image offset to metres, and tells conductors from what lies below them.",
+        description="Roughly. What is more than twice as deep is not taken for the line, nor what runs further beside "
+        "it than three quarters of this; until the flight has told, offsets in the image become metres by it.",
     )
     conductor_spacing_m: float | None = Field(
         None,

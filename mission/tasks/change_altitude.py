@@ -15,6 +15,7 @@ class ChangeAltitudeTask:
     def __init__(self, altitude_m: float, guidance: GuidanceSettings, memory: FlightMemory) -> None:
         self._down_m = memory.start.down_m - altitude_m
         self._guidance = guidance
+        self._memory = memory
 
     def step(self, reference: Setpoint, seen: Observation) -> Step:
         """Move the height of the reference."""
@@ -22,5 +23,7 @@ class ChangeAltitudeTask:
         speed_m_s = self._guidance.climb_m_s if is_climb else self._guidance.descend_m_s
         setpoint = step_vertical(reference, self._down_m, speed_m_s, seen.dt_s)
         if setpoint.down_m == self._down_m and is_there(seen.state, setpoint, self._guidance.arrival_m):
+            if not self._memory.known_line.is_begun:
+                self._memory.known_line.forget()  # what was seen from other heights tells little, and may mislead
             return Step(setpoint, done="reached the height")
         return Step(setpoint)

@@ -74,8 +74,7 @@ class SpanChoice:
         turn_rad = abs(wrap_line_angle_rad(spans[0].heading_rad - target_rad))
         if len(spans) == 1 and turn_rad > _SAME_RAD and self.line is not None:
             # The vehicle has flown past a bend that it did not see: nothing but the span beyond it is in view.
-            self._approach(reference, sight, self.line, spans[0], moved_m, is_passed=True)
-            return True
+            return self._approach(reference, sight, self.line, spans[0], moved_m, is_passed=True)
         is_bent = found.next_line is not None
         self.take(spans[0], target_rad, is_place_sure=found.is_placed or is_bent)
         if len(spans) == 2:
@@ -84,15 +83,18 @@ class SpanChoice:
 
     def _approach(
         self, reference: Setpoint, sight: Sight, span: WorldLine, beyond: WorldLine, moved_m: float, *, is_passed: bool
-    ) -> None:
-        """Turn at a bend that several sights agree about, once the setpoint or (`is_passed`) the vehicle is there."""
+    ) -> bool:
+        """Turn at a bend that several sights agree about, once the setpoint or (`is_passed`) the vehicle is there.
+
+        Returns whether it has turned.
+        """
         along_rad = self.target_rad or 0.0
         from_vehicle_m = beyond.crossing_m(sight.north_m, sight.east_m, along_rad, least_rad=_LEAST_TURN_RAD)
         bend_m = beyond.crossing_m(reference.north_m, reference.east_m, along_rad, least_rad=_LEAST_TURN_RAD)
         if bend_m is None or from_vehicle_m is None:
-            return
+            return False
         if not is_passed and from_vehicle_m <= -_PASSED_M:
-            return
+            return False
         is_again = (
             self._beyond is not None
             and abs(wrap_line_angle_rad(beyond.heading_rad - self._beyond.heading_rad)) < _SAME_RAD
@@ -105,13 +107,15 @@ class SpanChoice:
         self._n_agreeing = self._n_agreeing + 1 if is_again else 1
         self._beyond = beyond
         if self._n_agreeing < _N_SIGHTS:
-            return
+            return False
         self.bend_m = bend_m
-        if bend_m <= 0.0 or is_passed:
-            turn_rad = abs(wrap_line_angle_rad(beyond.heading_rad - span.heading_rad))
-            self._left = _LeftSpan(span.heading_rad, min(_SAME_RAD, turn_rad / 2), moved_m + _IN_SIGHT_M)
-            self._beyond, self._n_agreeing = None, 0
-            self.take(beyond, along_rad, is_place_sure=True)
+        if bend_m > 0.0 and not is_passed:
+            return False
+        turn_rad = abs(wrap_line_angle_rad(beyond.heading_rad - span.heading_rad))
+        self._left = _LeftSpan(span.heading_rad, min(_SAME_RAD, turn_rad / 2), moved_m + _IN_SIGHT_M)
+        self._beyond, self._n_agreeing = None, 0
+        self.take(beyond, along_rad, is_place_sure=True)
+        return True
 
     def _is_left(self, span: WorldLine, moved_m: float) -> bool:
         left = self._left

@@ -70,7 +70,7 @@ def test_a_span_that_alone_is_in_view_is_turned_to_when_two_sights_agree_and_the
     """The bend passed below unseen: so a sight of both is no bend back."""
     spans = on_its_way()
     ahead, beyond = replace(UP, north_m=2.5), WorldLine(math.radians(30.0), 1.0, 0.0)
-    assert spans.see(ahead, sight(beyond, at=ahead), 10.0, 0.0)
+    assert not spans.see(ahead, sight(beyond, at=ahead), 10.0, 0.0)
     assert spans.target_rad == 0.0
     assert spans.see(ahead, sight(beyond, at=ahead), 10.0, 0.0)
     for _ in range(6):
