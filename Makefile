@@ -13,8 +13,8 @@ fly: $(VENV)/.installed
 
 test: $(VENV)/.installed-dev
 	$(BIN)/python -m pytest -n auto -m "not real_time"
-	$(BIN)/python -m pytest -n 2 tests/over_mavlink
-	$(BIN)/python -m pytest -m real_time --ignore tests/over_mavlink
+	$(BIN)/python -m pytest -n 2 -m real_time --ignore tests/e2e --ignore tests/vision_worker
+	$(BIN)/python -m pytest -m real_time tests/e2e tests/vision_worker
 
 test-v4l2: $(VENV)/.installed-dev
 	$(BIN)/python -m tests.v4l2_guest.boot $(PYTEST)

@@ -14,7 +14,11 @@ _DEPTH_DOUBT = 0.5  # of an inverse depth that is only supposed
 _DEPTH_KNOWN = 0.15  # of one that the way flown has told
 _DEPTH_DRIFT = 0.02  # in the square root of a second: conductors sag, ground rises
 _PLACE_DRIFT_M = 0.03  # in the square root of a second: conductors swing
-_DEPTH_HITS, _DEPTH_AGE_S = 8, 0.5  # texture may look like a wire for a few frames, at any depth
+_DEPTH_HITS, _DEPTH_SEEN_S, _SEEN_AT_MOST_S = (
+    12,
+    0.5,
+    0.1,
+)  # texture may look like a wire for a few frames, at any depth
 _STEADY_SHARE = 0.4
 _IN_SIGHT_S = 0.5
 _LEAST_VARIANCE = 1e-12
@@ -37,7 +41,7 @@ class Wire:
     var_rho: float
     n_hits: int = 1
     share: float = 0.5
-    age_s: float = 0.0
+    seen_s: float = 0.0
     unseen_s: float = 0.0
     is_member: bool = False
 
@@ -62,7 +66,7 @@ class Wire:
     @property
     def is_depth_known(self) -> bool:
         """Whether the depth is more than supposed."""
-        is_looked_at = self.n_hits >= _DEPTH_HITS and self.age_s >= _DEPTH_AGE_S
+        is_looked_at = self.n_hits >= _DEPTH_HITS and self.seen_s >= _DEPTH_SEEN_S
         return is_looked_at and math.sqrt(self.var_rho) < _DEPTH_KNOWN * self.rho_per_m
 
     @property
@@ -89,7 +93,6 @@ class Wire:
         self.var_p += drift * place_m**2 + (_PLACE_DRIFT_M * self.rho_per_m) ** 2 * dt_s
         self.cov += drift * place_m
         self.var_rho += drift
-        self.age_s += dt_s
         self.unseen_s += dt_s
 
     def correct(self, slope: float, aside_m: float) -> None:
@@ -102,6 +105,7 @@ class Wire:
         self.var_p = max(_LEAST_VARIANCE, self.var_p - to_p * to_p / spread)
         self.cov -= to_p * to_rho / spread
         self.var_rho = max(_LEAST_VARIANCE, self.var_rho - to_rho * to_rho / spread)
+        self.seen_s += min(self.unseen_s, _SEEN_AT_MOST_S)
         self.n_hits, self.unseen_s = self.n_hits + 1, 0.0
 
     def shift(self, right_m: float) -> None:

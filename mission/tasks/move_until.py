@@ -7,6 +7,7 @@ from mission.guidance import GuidanceSettings, step_along
 from mission.tasks.odometer import NEARLY_M, Odometer
 from mission.tasks.task import FlightMemory, Observation, Step, is_there
 
+_BEFORE_M = 3.0  # a search may begin over its line
 _GONE_S = 2.0  # a line that was to be here, and is not seen for so long, is none
 
 
@@ -107,7 +108,9 @@ class MoveUntilTask:
                 self._goal_m = self._odometer.moved_m + min(0.0, lag_m)
             return
         crossing_m = found.line.crossing_m(reference.north_m, reference.east_m, heading_rad)
-        if found.depth_m is None or crossing_m is None:  # it may lie on the ground: go on, and see
+        if (
+            found.depth_m is None or crossing_m is None or self._odometer.moved_m + crossing_m < -_BEFORE_M
+        ):  # it may lie on the ground: go on, and see
             self._goal_m = None
         else:
             self._goal_m = min(self._odometer.moved_m + crossing_m, self._max_distance_m)

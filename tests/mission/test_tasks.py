@@ -183,6 +183,13 @@ def test_move_until_goes_on_where_the_line_is_not_seen_where_it_was_to_be() -> N
     assert reference.north_m == pytest.approx(15.0, abs=0.15)
 
 
+def test_move_until_does_not_go_back_behind_its_start() -> None:
+    task = build_task(MoveUntil(task="move_until", max_distance_m=30.0), GUIDANCE, memory())
+    step, end, _ = fly_perfectly(task, UP, WorldLine(math.pi / 2, -15.0, 0.0))
+    assert step.failed
+    assert end.north_m == pytest.approx(30.0)
+
+
 def test_move_until_waits_while_nothing_is_seen() -> None:
     """Without frames the line could pass below unseen."""
     task = build_task(MoveUntil(task="move_until", max_distance_m=30.0), GUIDANCE, memory())

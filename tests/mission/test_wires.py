@@ -173,7 +173,7 @@ def test_rows_on_the_ground_that_were_taken_for_each_other_are_no_complete_line(
     assert wires.is_complete
     crowded = cross(THREE, WAY_M)
     twin = Wire.at(0.0, 0.0, 6.5)
-    twin.p, twin.rho_per_m, twin.var_rho, twin.n_hits, twin.age_s = 0.1 / 6.5, 1 / 6.5, 1e-6, 60, 3.0
+    twin.p, twin.rho_per_m, twin.var_rho, twin.n_hits, twin.seen_s = 0.1 / 6.5, 1 / 6.5, 1e-6, 60, 3.0
     twin.is_member = True
     crowded.all.append(twin)
     assert not crowded.is_complete
