@@ -14,8 +14,8 @@ from mission.plan import MissionPlan
 OLDEST_PX4 = (1, 14)
 """Older versions name parameters differently."""
 
-MIN_FRAMES_HZ = 3.0
-"""Flight time; with less, guidance steers by old estimates."""
+MIN_FRAMES_HZ = 5.0
+"""Flight time; with less, guidance steers by old estimates, and the way across a line does not tell how deep it is."""
 
 _HOME = "home position"
 _LOG_BYTES_PER_S = 60_000  # records, without frames

@@ -9,16 +9,13 @@ plane across the line).
 import math
 from dataclasses import dataclass
 
-SLOPE_NOISE = 0.03  # what roll, pitch and their times err by [rad], about the same for all wires of a frame
+_SLOPE_NOISE = 0.03  # what roll, pitch and their times err by [rad], about the same for all wires of a frame
 _DEPTH_DOUBT = 0.5  # of an inverse depth that is only supposed
 _DEPTH_KNOWN = 0.15  # of one that the way flown has told
 _DEPTH_DRIFT = 0.02  # in the square root of a second: conductors sag, ground rises
 _PLACE_DRIFT_M = 0.03  # in the square root of a second: conductors swing
-_DEPTH_HITS, _DEPTH_SEEN_S, _SEEN_AT_MOST_S = (
-    12,
-    0.5,
-    0.1,
-)  # texture may look like a wire for a few frames, at any depth
+_DEPTH_HITS, _DEPTH_SEEN_S = 12, 0.5  # texture may look like a wire for a few frames, at any depth
+_SEEN_AT_MOST_S = 0.1  # at once
 _STEADY_SHARE = 0.4
 _IN_SIGHT_S = 0.5
 _LEAST_VARIANCE = 1e-12
@@ -50,7 +47,7 @@ class Wire:
         """A wire seen for the first time; its depth is supposed."""
         rho, var_rho = 1.0 / depth_m, (_DEPTH_DOUBT / depth_m) ** 2
         return cls(
-            slope + aside_m * rho, rho, SLOPE_NOISE**2 + aside_m**2 * var_rho, aside_m * var_rho, var_rho
+            slope + aside_m * rho, rho, _SLOPE_NOISE**2 + aside_m**2 * var_rho, aside_m * var_rho, var_rho
         )  # fmt: skip
 
     @property
@@ -98,7 +95,7 @@ class Wire:
     def correct(self, slope: float, aside_m: float) -> None:
         """Take in a sight."""
         to_p, to_rho = self.var_p - aside_m * self.cov, self.cov - aside_m * self.var_rho
-        spread = to_p - aside_m * to_rho + SLOPE_NOISE**2
+        spread = to_p - aside_m * to_rho + _SLOPE_NOISE**2
         error = slope - self.slope(aside_m)
         self.p += to_p / spread * error
         self.rho_per_m = max(_LEAST_PER_M, self.rho_per_m + to_rho / spread * error)

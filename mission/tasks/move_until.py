@@ -108,9 +108,7 @@ class MoveUntilTask:
                 self._goal_m = self._odometer.moved_m + min(0.0, lag_m)
             return
         crossing_m = found.line.crossing_m(reference.north_m, reference.east_m, heading_rad)
-        if (
-            found.depth_m is None or crossing_m is None or self._odometer.moved_m + crossing_m < -_BEFORE_M
-        ):  # it may lie on the ground: go on, and see
-            self._goal_m = None
-        else:
-            self._goal_m = min(self._odometer.moved_m + crossing_m, self._max_distance_m)
+        self._goal_m = None
+        if found.depth_m is not None and crossing_m is not None:  # else it may lie on the ground: go on, and see
+            goal_m = self._odometer.moved_m + crossing_m
+            self._goal_m = min(goal_m, self._max_distance_m) if goal_m > -_BEFORE_M else None

@@ -190,6 +190,7 @@ def flight_of(path: Path, metadata: dict[str, str]) -> Flight:
         checks=(),
         states=(state,),
         setpoints=(),
+        fixes=(),
         reports=(report,),
         tasks_started=(TaskStarted(S_NS, 0, "follow_lines"),),
         tasks_ended=(TaskEnded(3 * S_NS, 0, "follow_lines", TaskResult.COMPLETED, "done"),),
