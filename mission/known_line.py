@@ -30,7 +30,7 @@ _GONE_S = 2.0  # a line that is not surely one, or that is not followed yet, is 
 _SAME_RAD, _AGAIN_S = 0.2, 0.5  # two views of one span beyond a bend differ by less
 _GAP = 0.75  # share of the planned height: conductors of one line are less far apart
 _BUNDLE = 0.04  # wires closer than this slope are one conductor: a bundle's are 0.4 m apart
-_WIDEST_BUNDLE, _MOST_CONDUCTORS = 0.12, 18  # what is more are the rows of a field, which pass for each other
+_MOST_WIRES, _LARGEST_BUNDLE, _MOST_CONDUCTORS = 30, 6, 18  # more are the rows of a field, which pass for each other
 _DEPTH_AGREES = 0.35  # share by which the height that the spacing tells may differ from what the way flown has told
 
 
@@ -246,7 +246,8 @@ def _bundles(conductors: tuple[Bearing, ...]) -> list[list[Bearing]]:
 def _is_field(conductors: tuple[Bearing, ...]) -> bool:
     """Whether they are too many side by side to be those of a line."""
     bundles = _bundles(conductors)
-    return len(bundles) > _MOST_CONDUCTORS or any(b[-1].slope - b[0].slope > _WIDEST_BUNDLE for b in bundles)
+    is_dense = len(conductors) > _MOST_WIRES or max(map(len, bundles)) > _LARGEST_BUNDLE
+    return is_dense or len(bundles) > _MOST_CONDUCTORS
 
 
 def _one_each(conductors: tuple[Bearing, ...]) -> tuple[Bearing, ...]:
