@@ -16,7 +16,7 @@ class MoveUntilTask:
 
     The thesis stops there. By default we go on until the line is right below, because a vehicle beside the line would
     follow it from the side, and the way home, which is as long as the way here, would miss the take-off point. And we
-    go on until the way flown has told how far below the line is (mission/wires.py): what lies on the ground may look
+    go on until the way flown has told how far below the line is (mission/wire.py): what lies on the ground may look
     like one.
     """
 
