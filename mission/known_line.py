@@ -30,7 +30,7 @@ _GONE_S = 2.0  # a line that is not surely one, or that is not followed yet, is 
 _SAME_RAD, _AGAIN_S = 0.2, 0.5  # two views of one span beyond a bend differ by less
 _GAP = 0.75  # share of the planned height: conductors of one line are less far apart
 _BUNDLE = 0.04  # wires closer than this slope are one conductor: a bundle's are 0.4 m apart
-_MOST_WIRES, _LARGEST_BUNDLE, _MOST_CONDUCTORS = 30, 6, 18  # more are the rows of a field, which pass for each other
+_MOST_IN_VIEW, _LARGEST_BUNDLE, _MOST_CONDUCTORS = 30, 6, 18  # more are the rows of a field, which pass for each other
 _DEPTH_AGREES = 0.35  # share by which the height that the spacing tells may differ from what the way flown has told
 
 
@@ -114,9 +114,10 @@ class KnownLine:
         self._last_ns, self._last_down_m = max(view.t_ns, self._last_ns), view.down_m
         axis = self._axis or view.middle.line(view.north_m, view.east_m, guidance.height_over_line_m)
         view = view.along(axis.heading_rad)
-        if _is_field(view.conductors):
+        bundles = _bundles(view.conductors)
+        if _are_of_a_field(bundles):
             return None
-        view = replace(view, conductors=_one_each(view.conductors))
+        view = replace(view, conductors=tuple(_middle_of(bundle) for bundle in bundles))
         if self._is_gone(view.t_ns):
             self._start(view, guidance)
             axis = self._axis or axis
@@ -243,18 +244,14 @@ def _bundles(conductors: tuple[Bearing, ...]) -> list[list[Bearing]]:
     return bundles
 
 
-def _is_field(conductors: tuple[Bearing, ...]) -> bool:
+def _are_of_a_field(bundles: list[list[Bearing]]) -> bool:
     """Whether they are too many side by side to be those of a line."""
-    bundles = _bundles(conductors)
-    is_dense = len(conductors) > _MOST_WIRES or max(map(len, bundles)) > _LARGEST_BUNDLE
+    is_dense = sum(map(len, bundles)) > _MOST_IN_VIEW or max(map(len, bundles)) > _LARGEST_BUNDLE
     return is_dense or len(bundles) > _MOST_CONDUCTORS
 
 
-def _one_each(conductors: tuple[Bearing, ...]) -> tuple[Bearing, ...]:
-    """The conductors from left to right, the wires of one bundle as one."""
-    merged = []
-    for bundle in _bundles(conductors):
-        first_rad = bundle[0].heading_rad
-        turn_rad = statistics.fmean(wrap_line_angle_rad(one.heading_rad - first_rad) for one in bundle)
-        merged.append(Bearing(first_rad + turn_rad, statistics.fmean(one.slope for one in bundle)))
-    return tuple(merged)
+def _middle_of(bundle: list[Bearing]) -> Bearing:
+    """The wires of one bundle as one conductor."""
+    first_rad = bundle[0].heading_rad
+    turn_rad = statistics.fmean(wrap_line_angle_rad(one.heading_rad - first_rad) for one in bundle)
+    return Bearing(first_rad + turn_rad, statistics.fmean(one.slope for one in bundle))

@@ -46,9 +46,8 @@ class Wire:
     def at(cls, slope: float, aside_m: float, depth_m: float) -> "Wire":
         """A wire seen for the first time; its depth is supposed."""
         rho, var_rho = 1.0 / depth_m, (_DEPTH_DOUBT / depth_m) ** 2
-        return cls(
-            slope + aside_m * rho, rho, _SLOPE_NOISE**2 + aside_m**2 * var_rho, aside_m * var_rho, var_rho
-        )  # fmt: skip
+        var_p = _SLOPE_NOISE**2 + aside_m**2 * var_rho
+        return cls(slope + aside_m * rho, rho, var_p, aside_m * var_rho, var_rho)
 
     @property
     def place_m(self) -> float:
