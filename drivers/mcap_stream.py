@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, BinaryIO, cast
 
 from mcap.exceptions import EndOfFile
-from mcap.records import Channel, Message
+from mcap.records import Attachment, Channel, Message
 from mcap.stream_reader import StreamReader
 
 if TYPE_CHECKING:
@@ -44,8 +44,8 @@ def whole_records(file: BinaryIO) -> tuple[int, bool]:
     return end, False
 
 
-def messages(stream: BinaryIO) -> Iterator[tuple[str, int, bytes]]:
-    """Topic, log time [ns, Unix] and body of each message, in the order written."""
+def messages(stream: BinaryIO, attachments: dict[str, bytes] | None = None) -> Iterator[tuple[str, int, bytes]]:
+    """Topic, log time [ns, Unix] and body of each message, in the order written; fills `attachments` by name."""
     topics: dict[int, str] = {}
     try:
         for record in StreamReader(stream, validate_crcs=True, record_size_limit=None).records:
@@ -53,18 +53,20 @@ def messages(stream: BinaryIO) -> Iterator[tuple[str, int, bytes]]:
                 topics[record.id] = record.topic
             elif isinstance(record, Message):
                 yield topics[record.channel_id], record.log_time, record.data
+            elif isinstance(record, Attachment) and attachments is not None:
+                attachments[record.name] = record.data
     except EndOfFile:
         # The stream holds whole records only: this is the end of a log that was never closed.
         return
 
 
-def open_messages(file: BinaryIO) -> Iterator[tuple[str, int, bytes]]:
+def open_messages(file: BinaryIO, attachments: dict[str, bytes] | None = None) -> Iterator[tuple[str, int, bytes]]:
     """The messages of an open MCAP file as far as it is whole. Raises ValueError for another kind of file."""
     if file.read(len(MAGIC)) != MAGIC:
         raise ValueError("not an MCAP file")
     whole_bytes, _ = whole_records(file)
     file.seek(0)
-    return messages(cast("BinaryIO", _Head(file, whole_bytes)))
+    return messages(cast("BinaryIO", _Head(file, whole_bytes)), attachments)
 
 
 class _Head(io.RawIOBase):

@@ -68,7 +68,7 @@ class VehicleState:
 
     Position NED [m], velocity NED [m/s], attitude [rad] (FRD body to NED), battery 0 to 1 (None: not known yet).
     `is_failsafe` says that the autopilot acts against what it was told (MAV_STATE_CRITICAL), `is_position_ok` that it
-    knows where it is.
+    knows where it is. `boot_ns` is the autopilot's own time of the attitude, since it started (None: not told).
     """
 
     t_ns: int
@@ -88,6 +88,7 @@ class VehicleState:
     is_connected: bool
     is_failsafe: bool = False
     is_position_ok: bool = True
+    boot_ns: int | None = None
 
 
 @dataclass(frozen=True, slots=True)

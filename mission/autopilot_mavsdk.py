@@ -21,6 +21,7 @@ from mavsdk.asyncio.plugins.offboard import OffboardAsync, PositionNedYaw
 from mavsdk.asyncio.plugins.param import ParamAsync
 from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
 from mavsdk.logging import log_subscribe
+from mavsdk.plugins.mavlink_direct import MavlinkMessage
 from mavsdk.plugins.param import ParamError, ParamResult
 from mavsdk.plugins.telemetry import FlightMode as MavsdkMode
 from mavsdk.plugins.telemetry import LandedState as MavsdkLanded
@@ -37,6 +38,7 @@ from mission.autopilot import (
     Setpoint,
     VehicleState,
 )
+from mission.records import ClockSync
 
 T = TypeVar("T")
 
@@ -54,6 +56,7 @@ _FAILSAFE_STATES = (5, 6)  # MAV_STATE_CRITICAL, MAV_STATE_EMERGENCY
 _TELEMETRY_RATE_HZ = 50.0
 _STATUS_RATE_HZ = 5.0
 _BATTERY_RATE_HZ = 2.0
+_SYNC_PERIOD_S = 1.0
 
 _MODES = {
     MavsdkMode.UNKNOWN: FlightMode.UNKNOWN,
@@ -86,13 +89,22 @@ _HEALTH_WORDS = {
 class MavsdkAutopilot:
     """A vehicle at a MAVSDK connection URL. See mission.autopilot.Autopilot for what the methods promise.
 
-    `on_log` gets MAVSDK's own log lines, which would otherwise go to the terminal in colour.
+    `on_log` gets MAVSDK's own log lines, which would otherwise go to the terminal in colour; `on_sync` hears once a
+    second how the autopilot's clock stands to ours.
     """
 
-    def __init__(self, connection: str, clock: Clock, on_log: Callable[[str], None]) -> None:
+    def __init__(
+        self,
+        connection: str,
+        clock: Clock,
+        on_log: Callable[[str], None],
+        on_sync: Callable[[ClockSync], None] = lambda sync: None,
+    ) -> None:
         self._connection = connection
         self._clock = clock
         self._on_log = on_log
+        self._on_sync = on_sync
+        self._asked_ns = 0
         self._mavsdk: Mavsdk | None = None
         self._system: Any = None
         self._action: Any = None
@@ -134,6 +146,7 @@ class MavsdkAutopilot:
             is_connected=newest["connected"] and not self._is_deaf,
             is_failsafe=newest["failsafe"],
             is_position_ok=self._is_position_ok(),
+            boot_ns=int(attitude.timestamp_us) * 1000 if attitude.timestamp_us else None,
         )
 
     @property
@@ -201,8 +214,10 @@ class MavsdkAutopilot:
             (system.is_connected_state(), self._keep("connected")),
             (direct.subscribe_message("HEARTBEAT"), self._take_heartbeat),
             (direct.subscribe_message("POSITION_TARGET_LOCAL_NED"), self._take_target),
+            (direct.subscribe_message("TIMESYNC"), self._take_timesync),
         ]
         self._subscriptions = [asyncio.create_task(self._pump(stream, take)) for stream, take in streams]
+        self._subscriptions.append(asyncio.create_task(self._ask_time(direct)))
         # ArduPilot streams nothing that was not asked for.
         rates: list[tuple[str, Callable[[float], Awaitable[None]], float]] = [
             ("positions", telemetry.set_rate_position_velocity_ned, _TELEMETRY_RATE_HZ),
@@ -352,6 +367,28 @@ class MavsdkAutopilot:
         place = [fields.get(key) for key in ("x", "y", "z", "yaw")]
         if all(isinstance(value, int | float) and math.isfinite(value) for value in place):
             self._target = Setpoint(*place)
+
+    async def _ask_time(self, direct: Any) -> None:
+        """Ask the autopilot for its time, once a second. Nobody waits for the answers."""
+        while True:
+            self._asked_ns = self._clock.now_ns()
+            question = MavlinkMessage(
+                message_name="TIMESYNC",
+                target_system_id=1,
+                target_component_id=_AUTOPILOT_COMPONENT,
+                fields_json=json.dumps({"tc1": 0, "ts1": self._asked_ns}),
+            )
+            with contextlib.suppress(AutopilotError):
+                await self._call("tell its time", direct.send_message(question))
+            await asyncio.sleep(_SYNC_PERIOD_S)
+
+    def _take_timesync(self, message: Any) -> None:
+        """The autopilot asks for our time, too, which MAVSDK answers; what matters here are answers to our question."""
+        fields = json.loads(message.fields_json)
+        boot_ns, asked_ns = int(fields["tc1"]), int(fields["ts1"])
+        if boot_ns and asked_ns == self._asked_ns:
+            now_ns = self._clock.now_ns()
+            self._on_sync(ClockSync(now_ns, boot_ns - (asked_ns + now_ns) // 2, now_ns - asked_ns))
 
     def _take_status_text(self, item: Any) -> None:
         self._status_texts.append(str(item.text).strip())

@@ -6,6 +6,7 @@ task for the next step, and sends it. It never waits for vision. [Ceron] section
 
 import asyncio
 import contextlib
+import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
@@ -29,7 +30,7 @@ from mission.helm import Helm, TakenOverError, UnsafeSetpointError
 from mission.logbook import Logbook
 from mission.plan import MissionPlan
 from mission.preflight import wait_until_ready
-from mission.records import MissionEnded, PreflightCheck, Result
+from mission.records import Attachment, AutopilotTarget, ControlTick, MissionEnded, Origin, PreflightCheck, Result
 from mission.reporting import FlightLog, Progress
 from mission.resumption import CannotResumeError, Resumption, plan_to_reckon
 from mission.safety import PAUSES, Hazard, Reaction, decide, keep_going_down
@@ -143,6 +144,9 @@ class Executive:
         )
         for check in ready.checks:
             self._log.record(PreflightCheck(self._clock.now_ns(), check.name, check.result, check.reason))
+        if ready.parameters is not None:
+            text = json.dumps(dict(ready.parameters), indent=1, sort_keys=True)
+            self._log.record(Attachment("parameters.json", "application/json", text.encode()))
         self._on_checks(ready.checks)
         state = self._autopilot.state
         if self._situation.is_interrupted:
@@ -172,6 +176,9 @@ class Executive:
         self._situation.begin(departure.memory)
         self._helm.start, self._helm.reference = departure.memory.start, departure.here
         self._flow.stand = departure.here
+        if departure.origin is not None:
+            place = departure.origin
+            self._log.record(Origin(self._clock.now_ns(), place.latitude_rad, place.longitude_rad, place.altitude_m))
         await self._crew.logbook.begin(departure.origin, departure.memory, vehicle_uid, departure.resumption)
         return None
 
@@ -197,10 +204,18 @@ class Executive:
             # A late tick must not become one large step: what was missed is lost, and the vehicle waits.
             dt_s = min((now_ns - last_ns) / NS_PER_S, 2.0 / CONTROL_RATE_HZ)
             last_ns = now_ns
+            self._log_tick(now_ns, dt_s, due_ns)
             await self._tick(now_ns, dt_s)
             due_ns = deadline_ns + period_ns
             deadline_ns = max(due_ns, self._clock.now_ns())  # what was missed is not made up for
             await asyncio.sleep(self._clock.wall_s((deadline_ns - self._clock.now_ns()) / NS_PER_S))
+
+    def _log_tick(self, now_ns: int, dt_s: float, due_ns: int) -> None:
+        state, target = self._autopilot.state, self._autopilot.target
+        age_s = 0.0 if state is None else (now_ns - state.t_ns) / NS_PER_S
+        self._log.record(ControlTick(now_ns, dt_s, self._clock.wall_s((now_ns - due_ns) / NS_PER_S), age_s))
+        if target is not None:
+            self._log.record(AutopilotTarget(now_ns, target.north_m, target.east_m, target.down_m, target.yaw_rad))
 
     async def _tick(self, now_ns: int, dt_s: float) -> None:
         state = self._autopilot.state

@@ -13,6 +13,7 @@ from pathlib import Path
 
 from drivers.camera.camera import Camera, Intrinsics
 from drivers.clock import ScaledClock
+from mission.attachments import flight_attachments
 from mission.autopilot import VehicleState
 from mission.autopilot_mavsdk import MavsdkAutopilot
 from mission.build import vision_settings
@@ -109,7 +110,10 @@ async def fly(
         )
         eyes = WorkerEyes(make_worker, clock, clock.wall_s(1.0 / plan.camera.rate_hz))
         autopilot = MavsdkAutopilot(
-            setup.connection, clock, lambda text: recorder.record_status_text(clock.now_ns(), f"mavsdk {text}")
+            setup.connection,
+            clock,
+            lambda text: recorder.record_status_text(clock.now_ns(), f"mavsdk {text}"),
+            recorder.record,
         )
         surroundings = Surroundings(
             Watched(
@@ -121,6 +125,8 @@ async def fly(
                 lambda: guard.failure,
             )
         )
+        for item in (camera, *flight_attachments(setup.mission, plan)):
+            recorder.record(item)
         logbook = Logbook(journal, _papers(setup, path))
         crew = Crew(autopilot, eyes, camera, recorder, logbook, surroundings.view)
         executive = Executive(plan, crew, clock, setup.resumption, lambda checks: _before_arming(checks, on_checks))

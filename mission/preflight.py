@@ -27,10 +27,11 @@ _MIN_FRAMES = 3
 
 @dataclass(frozen=True, slots=True)
 class Readiness:
-    """What the checks found, and who flies the vehicle (None: it did not say)."""
+    """What the checks found, who flies the vehicle, and its parameters that were read (None: it did not say)."""
 
     checks: list[Check]
     identity: Identity | None
+    parameters: Mapping[str, float] | None
 
     @property
     def failures(self) -> list[str]:
@@ -118,7 +119,7 @@ async def wait_until_ready(
             final_since_s = None if not is_final else now_s if final_since_s is None else final_since_s
             is_over = final_since_s is not None and now_s - final_since_s >= _FINAL_AFTER_S
             if not has_failed or is_over or is_stopped() or now_s > limit_s:
-                return Readiness(checks, answers.identity)
+                return Readiness(checks, answers.identity, answers.parameters)
             if asking.done():
                 asking.result()  # a bug in there is ours to hear of
             await asyncio.sleep(clock.wall_s(_POLL_S))

@@ -81,6 +81,62 @@ class MissionEnded:
 
 
 @dataclass(frozen=True, slots=True)
+class Attachment:
+    """A file that the log keeps whole: the mission, the parameters, what the computer is. JSON or YAML as UTF-8."""
+
+    name: str
+    media_type: str
+    data: bytes
+
+
+@dataclass(frozen=True, slots=True)
+class Origin:
+    """Where on Earth the autopilot's local frame has its origin (GPS_GLOBAL_ORIGIN), WGS-84 [rad], [m above sea]."""
+
+    t_ns: int
+    latitude_rad: float
+    longitude_rad: float
+    altitude_m: float
+
+
+@dataclass(frozen=True, slots=True)
+class AutopilotTarget:
+    """Where the autopilot said that it flies to (POSITION_TARGET_LOCAL_NED): NED [m], yaw [rad]."""
+
+    t_ns: int
+    north_m: float
+    east_m: float
+    down_m: float
+    yaw_rad: float
+
+
+@dataclass(frozen=True, slots=True)
+class ControlTick:
+    """One round of the control loop, which began at `t_ns`.
+
+    The task was told that `dt_s` have passed; the tick began `late_s` [s, wall] after it was due, and its telemetry was
+    `state_age_s` [s] old.
+    """
+
+    t_ns: int
+    dt_s: float
+    late_s: float
+    state_age_s: float
+
+
+@dataclass(frozen=True, slots=True)
+class ClockSync:
+    """How the autopilot's clock stands to ours (TIMESYNC): its time since boot minus flight time.
+
+    The question took `round_trip_ns` to be answered, which is the link's latency there and back.
+    """
+
+    t_ns: int
+    boot_minus_flight_ns: int
+    round_trip_ns: int
+
+
+@dataclass(frozen=True, slots=True)
 class LineFix:
     """What a frame taken at `t_ns` told of the line that is looked for or followed (mission/known_line.py).
 

@@ -24,6 +24,11 @@ class Backlog:
         self.n_dropped_images = 0
         self.n_dropped_records = 0
 
+    @property
+    def n_waiting(self) -> int:
+        """How many records wait to be taken."""
+        return len(self._waiting)
+
     def put(self, record: object) -> None:
         """Add a record, or count it as dropped; returns at once."""
         with self._changed:

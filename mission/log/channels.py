@@ -1,5 +1,6 @@
 """The table of everything a flight log holds: which topic carries what, in which schema, how often."""
 
+import enum
 from dataclasses import dataclass
 from typing import Any
 
@@ -8,10 +9,30 @@ from pydantic import TypeAdapter
 from drivers.clock import NS_PER_S
 from drivers.mcap_stream import IMAGE_TOPIC
 from mission.autopilot import VehicleState
-from mission.log.records import LoggedMission, SentSetpoint, StatusText, VisionEntry
-from mission.records import Event, LineFix, MissionEnded, PreflightCheck, TaskEnded, TaskStarted, TrueLine, TruePose
+from mission.log.records import LoggedMission, LogHealth, SentSetpoint, StatusText, VisionEntry
+from mission.records import (
+    AutopilotTarget,
+    ClockSync,
+    ControlTick,
+    Event,
+    LineFix,
+    MissionEnded,
+    Origin,
+    PreflightCheck,
+    TaskEnded,
+    TaskStarted,
+    TrueLine,
+    TruePose,
+)
 
 PROFILE = "lineflight"
+
+
+class Kept(enum.StrEnum):
+    """How much of a stream the log keeps."""
+
+    ALWAYS = "always"
+    SAMPLED = "sampled"
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,6 +49,11 @@ class RecordChannel:
     rate: str
     max_rate_hz: float | None = None
 
+    @property
+    def kept(self) -> Kept:
+        """Whether all of it is kept."""
+        return Kept.ALWAYS if self.max_rate_hz is None else Kept.SAMPLED
+
 
 @dataclass(frozen=True, slots=True)
 class FoxgloveChannel:
@@ -37,13 +63,20 @@ class FoxgloveChannel:
     schema: str
     what: str
     rate: str
+    kept: Kept = Kept.ALWAYS
 
 
 RECORD_CHANNELS = (
     RecordChannel("/mission", LoggedMission, "the mission file, and how log times belong to flight times", "once"),
     RecordChannel("/preflight/check", PreflightCheck, "what each check before arming found", "once each"),
+    RecordChannel("/vehicle/origin", Origin, "where on Earth the local frame lies", "once"),
     RecordChannel("/vehicle/state", VehicleState, "the vehicle as telemetry tells it", "every control tick"),
+    RecordChannel(
+        "/vehicle/target", AutopilotTarget, "where the autopilot says that it flies to", "at most 10 Hz", 10.0
+    ),
+    RecordChannel("/vehicle/clock", ClockSync, "the autopilot's clock against ours, and the link's latency", "1 Hz"),
     RecordChannel("/setpoint", SentSetpoint, "the offboard setpoints", "every control tick while offboard"),
+    RecordChannel("/control/tick", ControlTick, "how punctual the control loop is", "every control tick"),
     RecordChannel("/vision/report", VisionEntry, "line estimates and power lines", "every frame worked on"),
     RecordChannel("/line", LineFix, "where the line is, as far as known", "every frame that showed it"),
     RecordChannel("/task/started", TaskStarted, "the executive entered a task", "on change"),
@@ -51,20 +84,42 @@ RECORD_CHANNELS = (
     RecordChannel("/mission/ended", MissionEnded, "how the flight ended", "once"),
     RecordChannel("/event", Event, "what happened and what was done about it", "on change"),
     RecordChannel("/status_text", StatusText, "the autopilot's own words", "on change"),
-    RecordChannel("/truth/pose", TruePose, "where a simulated vehicle truly was", "at most 20 Hz", max_rate_hz=20.0),
+    RecordChannel("/log/health", LogHealth, "how the log itself does", "1 Hz"),
+    RecordChannel("/truth/pose", TruePose, "where a simulated vehicle truly was", "at most 20 Hz", 20.0),
     RecordChannel("/truth/line", TrueLine, "the simulated power line", "once"),
 )
 
-IMAGE = FoxgloveChannel(IMAGE_TOPIC, "foxglove.CompressedImage", "the camera's frames as JPEG", "the log's frame rate")
-ANNOTATIONS = FoxgloveChannel(
-    "/camera/lines", "foxglove.ImageAnnotations", "the power lines found on a frame, at its time", "with each frame"
+IMAGE = FoxgloveChannel(
+    IMAGE_TOPIC,
+    "foxglove.CompressedImage",
+    "the camera's frames as JPEG",
+    "vision.log_rate_hz; 0 turns it off",
+    Kept.SAMPLED,
 )
-TRANSFORM = FoxgloveChannel("/tf", "foxglove.FrameTransform", "ned in map (ENU), vehicle (FRD) in ned", "as the state")
+ANNOTATIONS = FoxgloveChannel(
+    "/camera/lines",
+    "foxglove.ImageAnnotations",
+    "the power lines found on a frame, at its time",
+    "with each frame kept",
+    Kept.SAMPLED,
+)
+CALIBRATION = FoxgloveChannel("/camera/calibration", "foxglove.CameraCalibration", "the camera's intrinsics", "once")
+TRANSFORM = FoxgloveChannel(
+    "/tf", "foxglove.FrameTransform", "ned in map (ENU), vehicle (FRD) in ned, camera in vehicle", "as the state"
+)
 POSE = FoxgloveChannel("/vehicle/pose", "foxglove.PoseInFrame", "the vehicle's pose in ned", "as the state")
+LOCATION = FoxgloveChannel(
+    "/vehicle/location",
+    "foxglove.LocationFix",
+    "the vehicle on Earth, once the origin is known",
+    "at most 2 Hz",
+    Kept.SAMPLED,
+)
 LOG = FoxgloveChannel("/log", "foxglove.Log", "events, tasks and the autopilot's words to read along", "on change")
 SCENE = FoxgloveChannel("/truth/scene", "foxglove.SceneUpdate", "the simulated conductors and poles", "once")
 
-FOXGLOVE_CHANNELS = (IMAGE, ANNOTATIONS, TRANSFORM, POSE, LOG, SCENE)
+LOCATION_RATE_HZ = 2.0
+FOXGLOVE_CHANNELS = (IMAGE, ANNOTATIONS, CALIBRATION, TRANSFORM, POSE, LOCATION, LOG, SCENE)
 
 
 class RateLimit:

@@ -28,6 +28,7 @@ class LogFile:
             reason = error.strerror or str(error)
             raise LogError(f"The log {path} cannot be made ({reason}); name a folder that can be written.") from error
         self._path = path
+        self.n_bytes = 0
         self.failure: str | None = None
 
     def write(self, data: bytes | bytearray) -> int:
@@ -36,7 +37,9 @@ class LogFile:
             try:
                 rest = memoryview(data)
                 while rest:
-                    rest = rest[self._file.write(rest) :]
+                    n_written = self._file.write(rest)
+                    self.n_bytes += n_written
+                    rest = rest[n_written:]
             except OSError as error:
                 self._fail(error)
         return len(data)

@@ -1,7 +1,7 @@
 """Read a flight back from its log, also from one that was cut off when the power went."""
 
-import io
 from collections import defaultdict
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -9,12 +9,25 @@ from typing import Any, BinaryIO
 import numpy as np
 from pydantic import ValidationError
 
-from drivers.mcap_stream import IMAGE_DATA_FIELD, IMAGE_TOPIC, MAGIC, bytes_field, messages, whole_records
+from drivers.mcap_stream import IMAGE_DATA_FIELD, IMAGE_TOPIC, MAGIC, bytes_field, open_messages, whole_records
 from mission.autopilot import VehicleState
 from mission.log import channels
 from mission.log.errors import LogError
-from mission.log.records import LoggedMission, SentSetpoint, StatusText, VisionEntry
-from mission.records import Event, LineFix, MissionEnded, PreflightCheck, TaskEnded, TaskStarted, TrueLine, TruePose
+from mission.log.records import LoggedMission, LogHealth, SentSetpoint, StatusText, VisionEntry
+from mission.records import (
+    AutopilotTarget,
+    ClockSync,
+    ControlTick,
+    Event,
+    LineFix,
+    MissionEnded,
+    Origin,
+    PreflightCheck,
+    TaskEnded,
+    TaskStarted,
+    TrueLine,
+    TruePose,
+)
 from vision.records import VisionReport
 
 
@@ -40,6 +53,12 @@ class Flight:
     status_texts: tuple[StatusText, ...]
     truth: tuple[TruePose, ...]
     line: TrueLine | None
+    origin: Origin | None
+    targets: tuple[AutopilotTarget, ...]
+    ticks: tuple[ControlTick, ...]
+    syncs: tuple[ClockSync, ...]
+    health: tuple[LogHealth, ...]
+    attachments: dict[str, bytes]
     end_ns: int
     is_truncated: bool
 
@@ -64,12 +83,13 @@ def _read(path: Path, file: BinaryIO, with_images: bool) -> Flight:
         raise LogError(f"The log {path} is empty; the flight ended before anything was written to it.")
     if magic != MAGIC:
         raise LogError(f"{path} is not an MCAP file; name a log that lineflight wrote (.mcap).")
-    whole_bytes, is_closed = whole_records(file)
+    _, is_closed = whole_records(file)
     file.seek(0)
     streams: dict[type, list[Any]] = defaultdict(list)
     jpegs: dict[int, bytes] = {}
+    attachments: dict[str, bytes] = {}
     try:
-        for topic, log_time_ns, body in messages(io.BytesIO(file.read(whole_bytes))):
+        for topic, log_time_ns, body in open_messages(file, attachments):
             if topic in channels.CHANNEL_AT:
                 streams[channels.CHANNEL_AT[topic].record].append(channels.decode(topic, body))
             elif with_images and topic == IMAGE_TOPIC:
@@ -84,16 +104,38 @@ def _read(path: Path, file: BinaryIO, with_images: bool) -> Flight:
         raise LogError(f"The log {path} is damaged ({type(error).__name__}: {error}); recover it with mcap.") from error
     if not streams[LoggedMission]:
         raise LogError(f"{path} holds no mission; it is not the log of a flight, or was cut off at its very start.")
-    return _flight(path, streams, jpegs, is_truncated=not is_closed)
+    return _flight(path, streams, jpegs, attachments, is_truncated=not is_closed)
 
 
-def _flight(path: Path, streams: dict[type, list[Any]], jpegs: dict[int, bytes], *, is_truncated: bool) -> Flight:
+def read_images(flight: Flight) -> Iterator[tuple[int, bytes]]:
+    """Capture time [ns, flight] and JPEG of each frame that a flight's log holds, one after the other.
+
+    Raises LogError when the file cannot be read any more.
+    """
+    try:
+        with flight.path.open("rb") as file:
+            for topic, log_time_ns, body in open_messages(file):
+                if topic == IMAGE_TOPIC:
+                    jpeg = bytes_field(body, IMAGE_DATA_FIELD)
+                    yield log_time_ns - flight.mission.unix_minus_flight_ns, jpeg
+    except OSError as error:
+        raise LogError(f"The log {flight.path} cannot be read ({error.strerror}); is its disk still there?") from error
+
+
+def _flight(
+    path: Path,
+    streams: dict[type, list[Any]],
+    jpegs: dict[int, bytes],
+    attachments: dict[str, bytes],
+    *,
+    is_truncated: bool,
+) -> Flight:
     for records in streams.values():
         records.sort(key=lambda record: getattr(record, "t_ns", 0))
     mission: LoggedMission = streams[LoggedMission][0]
     offset_ns = mission.unix_minus_flight_ns
     times_ns = [records[-1].t_ns for records in streams.values() if records and hasattr(records[-1], "t_ns")]
-    ended, lines = streams[MissionEnded], streams[TrueLine]
+    ended, lines, origins = streams[MissionEnded], streams[TrueLine], streams[Origin]
     return Flight(
         path=path,
         mission=mission,
@@ -109,6 +151,12 @@ def _flight(path: Path, streams: dict[type, list[Any]], jpegs: dict[int, bytes],
         status_texts=tuple(streams[StatusText]),
         truth=tuple(streams[TruePose]),
         line=lines[-1] if lines else None,
+        origin=origins[-1] if origins else None,
+        targets=tuple(streams[AutopilotTarget]),
+        ticks=tuple(streams[ControlTick]),
+        syncs=tuple(streams[ClockSync]),
+        health=tuple(streams[LogHealth]),
+        attachments=attachments,
         end_ns=max([mission.start_ns, *times_ns]),
         is_truncated=is_truncated,
     )

@@ -16,17 +16,24 @@ from foxglove import channels as fox_channels
 from foxglove import messages as fox
 from foxglove.mcap import MCAPWriteOptions, MCAPWriter
 
+from drivers.camera.camera import Intrinsics
 from drivers.clock import NS_PER_S, Clock, ScaledClock
-from mission.autopilot import Setpoint, VehicleState
+from mission.autopilot import GlobalPoint, Setpoint, VehicleState
+from mission.geodesy import point_at
 from mission.log import channels
 from mission.log.backlog import Backlog
 from mission.log.disk import LogFile
-from mission.log.records import LoggedMission, SentSetpoint, StatusText, VisionEntry
+from mission.log.records import LoggedMission, LogHealth, SentSetpoint, StatusText, VisionEntry
 from mission.log.wording import line_of
 from mission.records import (
+    Attachment,
+    AutopilotTarget,
+    ClockSync,
+    ControlTick,
     Event,
     LineFix,
     MissionEnded,
+    Origin,
     PreflightCheck,
     Severity,
     TaskEnded,
@@ -43,6 +50,8 @@ _FLUSH_PERIOD_S = 1.0
 _CLOSE_TIMEOUT_S = 10.0
 
 _MAP_FROM_NED = fox.Quaternion(x=math.sqrt(0.5), y=math.sqrt(0.5), z=0.0, w=0.0)  # ENU, which viewers hold upright
+_FRD_FROM_CAMERA = fox.Quaternion(x=0.0, y=0.0, z=math.sqrt(0.5), w=math.sqrt(0.5))  # looks down, its top forward
+_DISTORTION_MODEL = {"pinhole": "plumb_bob", "fisheye": "kannala_brandt"}
 _IDENTITY = fox.Pose(position=fox.Vector3(), orientation=fox.Quaternion(w=1.0))
 _LINE_COLOR = fox.Color(r=1.0, g=0.72, b=0.1, a=1.0)
 _SUPPORT_COLOR = fox.Color(r=0.55, g=0.45, b=0.35, a=1.0)
@@ -101,7 +110,7 @@ class Recorder:
         return None
 
     def record(self, item: object) -> None:
-        """Log a record of the flight: any record type of mission.log.channels, or a VisionReport."""
+        """Log a record: any type of mission.log.channels, a VisionReport, the camera's Intrinsics, an Attachment."""
         self._backlog.put(item)
 
     def record_setpoint(self, t_ns: int, setpoint: Setpoint) -> None:
@@ -138,6 +147,7 @@ class Recorder:
                     if self._file.failure is None:
                         self._write(log, record)
                 if time.monotonic() >= next_flush_s:
+                    self._write(log, self._health(log.newest_ns, self._file))
                     log.flush()
                     next_flush_s = time.monotonic() + _FLUSH_PERIOD_S
             log.close()
@@ -145,6 +155,17 @@ class Recorder:
             self._fault = f"The log {self.path} was given up: {type(error).__name__}: {error}."
         finally:
             self._file.close()
+
+    def _health(self, t_ns: int, file: LogFile) -> LogHealth:
+        backlog = self._backlog
+        return LogHealth(
+            t_ns,
+            file.n_bytes,
+            backlog.n_waiting,
+            backlog.n_dropped_images,
+            backlog.n_dropped_records,
+            time.thread_time(),
+        )
 
     def _write(self, log: "_FlightLog", record: object) -> None:
         try:
@@ -155,7 +176,10 @@ class Recorder:
 
 
 class _FlightLog:
-    """The MCAP writer: each record goes to its own JSON channel, and where a viewer can show it, to Foxglove's."""
+    """The MCAP writer: each record goes to its own JSON channel, and where a viewer can show it, to Foxglove's.
+
+    `newest_ns` is the newest time [ns, flight] of any record.
+    """
 
     def __init__(self, file: LogFile, mission: LoggedMission) -> None:
         context = self._context = foxglove.Context()  # its channels close when it goes
@@ -165,12 +189,14 @@ class _FlightLog:
         )
         self._mcap: MCAPWriter = foxglove.open_mcap(file, context=context, writer_options=options)
         self._offset_ns = mission.unix_minus_flight_ns
-        self._start_ns = mission.start_ns
+        self._start_ns = self.newest_ns = mission.start_ns
         self._limits = {
             channel.record: channels.RateLimit(channel.max_rate_hz)
             for channel in channels.RECORD_CHANNELS
             if channel.max_rate_hz is not None
         }
+        self._origin: GlobalPoint | None = None
+        self._location_limit = channels.RateLimit(channels.LOCATION_RATE_HZ)
         self._json = {
             channel.record: foxglove.Channel(
                 channel.topic,
@@ -214,6 +240,7 @@ class _FlightLog:
     def write_plain(self, record: Any) -> None:
         """Write a record as JSON; a channel with a rate limit skips what comes sooner."""
         t_ns = getattr(record, "t_ns", self._start_ns)
+        self.newest_ns = max(self.newest_ns, t_ns)
         limit = self._limits.get(type(record))
         if limit is None or limit.admits(t_ns):
             self._json[type(record)].log(channels.encode(record), log_time=t_ns + self._offset_ns)
@@ -257,6 +284,56 @@ class _FlightLog:
             timestamp=stamp, parent_frame_id="ned", child_frame_id="vehicle", translation=position, rotation=attitude
         )
         self._show(channels.TRANSFORM, state.t_ns, transform)
+        if self._origin is not None and self._location_limit.admits(state.t_ns):
+            here = point_at(Setpoint(state.north_m, state.east_m, state.down_m, state.yaw_rad), self._origin)
+            fix = fox.LocationFix(
+                timestamp=stamp,
+                frame_id="vehicle",
+                latitude=math.degrees(here.latitude_rad),
+                longitude=math.degrees(here.longitude_rad),
+                altitude=here.altitude_m,
+            )
+            self._show(channels.LOCATION, state.t_ns, fix)
+
+    def write_origin(self, origin: Origin) -> None:
+        """Write where the local frame lies; from now on the vehicle's places on Earth are known."""
+        self.write_plain(origin)
+        self._origin = GlobalPoint(origin.latitude_rad, origin.longitude_rad, origin.altitude_m)
+
+    def write_camera(self, camera: Intrinsics) -> None:
+        """Write the camera's calibration, and how it is mounted."""
+        stamp = self._stamp(self._start_ns)
+        fx, fy, cx, cy = camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px
+        calibration = fox.CameraCalibration(
+            timestamp=stamp,
+            frame_id="camera",
+            width=camera.width_px,
+            height=camera.height_px,
+            distortion_model=_DISTORTION_MODEL[camera.lens],
+            D=list(camera.distortion),
+            K=[fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0],
+            P=[fx, 0.0, cx, 0.0, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0],
+        )
+        self._show(channels.CALIBRATION, self._start_ns, calibration)
+        mount = fox.FrameTransform(
+            timestamp=stamp,
+            parent_frame_id="vehicle",
+            child_frame_id="camera",
+            translation=fox.Vector3(),
+            rotation=_FRD_FROM_CAMERA,
+        )
+        self._show(channels.TRANSFORM, self._start_ns, mount)
+
+    def attach(self, attachment: Attachment) -> None:
+        """Write a file."""
+        now_ns = time.time_ns()
+        self._mcap.attach(
+            log_time=now_ns,
+            create_time=now_ns,
+            name=attachment.name,
+            media_type=attachment.media_type,
+            data=attachment.data,
+        )
 
     def write_mission(self, mission: LoggedMission) -> None:
         self.write_plain(mission)
@@ -303,6 +380,13 @@ _WRITE: dict[type, Callable[[_FlightLog, Any], None]] = {
     Event: _FlightLog.write_worded,
     StatusText: _FlightLog.write_worded,
     LineFix: _FlightLog.write_plain,
+    AutopilotTarget: _FlightLog.write_plain,
+    ClockSync: _FlightLog.write_plain,
+    ControlTick: _FlightLog.write_plain,
+    LogHealth: _FlightLog.write_plain,
+    Origin: _FlightLog.write_origin,
+    Intrinsics: _FlightLog.write_camera,
+    Attachment: _FlightLog.attach,
     TruePose: _FlightLog.write_plain,
     TrueLine: _FlightLog.write_line,
 }

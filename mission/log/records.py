@@ -41,6 +41,22 @@ class StatusText:
 
 
 @dataclass(frozen=True, slots=True)
+class LogHealth:
+    """How the log itself does, told once a second by its writer.
+
+    `n_bytes` are on the disk; `n_waiting` records wait for it. `n_dropped_images` and `n_dropped_records` were given up
+    so far, because it was too slow. `work_s` is the processor time that writing has taken so far.
+    """
+
+    t_ns: int
+    n_bytes: int
+    n_waiting: int
+    n_dropped_images: int
+    n_dropped_records: int
+    work_s: float
+
+
+@dataclass(frozen=True, slots=True)
 class VisionEntry:
     """A VisionReport without its image; `power_lines_px` holds x1, y1, x2, y2 of each. Filed under its capture time."""
 

@@ -135,6 +135,7 @@ class InProcessAutopilot:
             self.is_connected,
             is_failsafe=self._heartbeat_failsafe,
             is_position_ok=self.sim.is_position_ok,
+            boot_ns=round(self.sim.boot_s * 1e9),
         )
 
     @property

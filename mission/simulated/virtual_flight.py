@@ -12,6 +12,7 @@ from pathlib import Path
 import cv2
 
 from drivers.clock import NS_PER_S
+from mission.attachments import flight_attachments
 from mission.build import vision_settings
 from mission.checks import Check
 from mission.executive import Crew, Executive
@@ -89,7 +90,8 @@ def fly_virtually(
             lambda: executive is None or executive.needs_vision,
         )
         with recorder, eyes:
-            recorder.record(true_line(world))
+            for item in (camera, *flight_attachments(mission, plan), true_line(world)):
+                recorder.record(item)
             autopilot.after_step.append(_truth_recorder(sim, recorder))
             papers = FlightPapers(plan.name, str(mission.path), mission.sha256, "in-process", "dry-run", str(path))
             crew = Crew(

@@ -7,13 +7,19 @@ from pathlib import Path
 import cv2
 import numpy as np
 
+from drivers.camera.camera import Intrinsics
 from drivers.clock import NS_PER_S
 from mission.autopilot import FlightMode, LandedState, Setpoint, VehicleState
 from mission.log.recorder import Recorder
 from mission.records import (
+    Attachment,
+    AutopilotTarget,
+    ClockSync,
+    ControlTick,
     Event,
     LineFix,
     MissionEnded,
+    Origin,
     Result,
     Severity,
     TaskEnded,
@@ -45,6 +51,9 @@ TASKS = (
     ("land", False, (0.2, 0.1, 0.0, 180.0), 6.0),
 )
 
+CAMERA = Intrinsics(WIDTH_PX, HEIGHT_PX, FOCAL_PX, FOCAL_PX, 319.5, 239.5)
+ORIGIN = Origin(START_NS, math.radians(47.4), math.radians(8.5), 488.0)
+PARAMETERS = Attachment("parameters.json", "application/json", b'{"MPC_XY_P": 0.95}')
 LINE = TrueLine(
     axis_ne_m=((LINE_NORTH_M, -20.0), (LINE_NORTH_M, 50.0)),
     conductors_ned_m=tuple(
@@ -61,6 +70,9 @@ def fly(*, image_period_s: float = 4.0) -> Iterator[tuple[int, object]]:
     pose = np.zeros(4)
     seq = 0
     yield t_ns, LINE
+    yield t_ns, CAMERA
+    yield t_ns, PARAMETERS
+    yield t_ns, ORIGIN
     for index, (task, is_offboard, goal, duration_s) in enumerate(TASKS):
         yield t_ns, TaskStarted(t_ns, index, task)
         first, goal_pose = pose, np.array([*goal[:3], math.radians(goal[3])])
@@ -92,8 +104,12 @@ def fly(*, image_period_s: float = 4.0) -> Iterator[tuple[int, object]]:
                     is_connected=True,
                 ),
             )
+            yield t_ns, ControlTick(t_ns, TICK_NS / NS_PER_S, 0.001, 0.01)
             if is_offboard:
                 yield t_ns + 1_000_000, Setpoint(north_m, east_m, down_m, yaw_rad)
+                yield t_ns, AutopilotTarget(t_ns, north_m, east_m, down_m, yaw_rad)
+            if tick % 20 == 0:
+                yield t_ns, ClockSync(t_ns, -START_NS, 4_000_000)
             has_image = tick % round(image_period_s * NS_PER_S / TICK_NS) == round(image_period_s * 5)
             yield t_ns, see(seq, t_ns, (north_m, east_m, down_m, yaw_rad), has_image=has_image)
             if seq % 2:

@@ -24,11 +24,35 @@ from mission.log.disk import log_path
 from mission.log.errors import LogError
 from mission.log.reader import Flight, read_flight
 from mission.log.recorder import Recorder
-from mission.log.records import SentSetpoint, StatusText
-from mission.records import Event, LineFix, MissionEnded, PreflightCheck, Severity, TaskEnded, TaskStarted, TruePose
+from mission.log.records import LogHealth, SentSetpoint, StatusText
+from mission.records import (
+    AutopilotTarget,
+    ClockSync,
+    ControlTick,
+    Event,
+    LineFix,
+    MissionEnded,
+    Origin,
+    PreflightCheck,
+    Severity,
+    TaskEnded,
+    TaskStarted,
+    TruePose,
+)
 from mission.safety import Hazard, Reaction
 from tests.log import synthetic_flight
-from tests.log.synthetic_flight import LINE, MISSION_TEXT, START_NS, TICK_NS, FixedClock, fly, put_down, write_log
+from tests.log.synthetic_flight import (
+    LINE,
+    MISSION_TEXT,
+    ORIGIN,
+    PARAMETERS,
+    START_NS,
+    TICK_NS,
+    FixedClock,
+    fly,
+    put_down,
+    write_log,
+)
 from vision.records import VisionReport
 
 DEADLINE_S = 60.0
@@ -59,6 +83,12 @@ def test_every_record_comes_back_as_it_was(flown: list[tuple[int, object]], log:
     assert flight.events == of_type(flown, Event)
     assert flight.fixes == of_type(flown, LineFix)
     assert flight.truth == of_type(flown, TruePose)
+    assert flight.ticks == of_type(flown, ControlTick)
+    assert flight.syncs == of_type(flown, ClockSync)
+    assert flight.origin == ORIGIN
+    assert flight.attachments == {PARAMETERS.name: PARAMETERS.data}
+    assert set(flight.targets) < set(of_type(flown, AutopilotTarget))  # thinned to 10 Hz
+    assert len(flight.targets) == pytest.approx(len(of_type(flown, AutopilotTarget)) / 2, rel=0.05)
     assert flight.line == LINE
     sent = [(t_ns, item) for t_ns, item in flown if isinstance(item, Setpoint)]
     assert flight.setpoints == tuple(SentSetpoint(t, s.north_m, s.east_m, s.down_m, s.yaw_rad) for t, s in sent)
@@ -99,7 +129,7 @@ def test_the_log_holds_the_channels_of_the_table_with_their_schemas(log: Path) -
         summary = make_reader(file).get_summary()
     assert summary is not None
     found = {channel.topic: summary.schemas[channel.schema_id] for channel in summary.channels.values()}
-    unused = {"/status_text", "/preflight/check"}
+    unused = {"/status_text", "/preflight/check", "/log/health"}
     for channel in channels.RECORD_CHANNELS:
         if channel.topic not in unused:
             assert found[channel.topic].encoding == "jsonschema"
@@ -126,6 +156,9 @@ st.register_type_strategy(float, st.floats(allow_nan=False, allow_infinity=False
     | st.builds(TruePose)
     | st.builds(LineFix)
     | st.builds(PreflightCheck)
+    | st.builds(ControlTick)
+    | st.builds(Origin)
+    | st.builds(LogHealth)
 )
 def test_any_record_survives_json(record: object) -> None:
     topic = channels.CHANNEL_OF[type(record)].topic
