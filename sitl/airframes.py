@@ -10,7 +10,21 @@ GRAVITY_M_S2 = 9.80665
 
 AirframeName = Literal["f550", "x500"]
 _Axes = tuple[float, float, float]
+_Rotors = tuple[tuple[float, float, float], ...]
+_DRAG_TORQUE_M = 0.016  # of each rotor's thrust, about the vertical
+
+
+def _ring(n_rotors: int, arm_m: float, first_rad: float) -> _Rotors:
+    """Rotors at the same distances around the middle, which turn this way and that way in turn."""
+    angles_rad = [first_rad + k * math.tau / n_rotors for k in range(n_rotors)]
+    return tuple(
+        (arm_m * math.cos(angle), arm_m * math.sin(angle), _DRAG_TORQUE_M * (-1.0) ** k)
+        for k, angle in enumerate(angles_rad)
+    )
+
+
 _F550_PACK = Pack()
+_F550_ROTORS = _ring(6, 0.275, math.pi / 6)
 
 
 class AirframeError(Exception):
@@ -27,7 +41,9 @@ class Airframe:
     rotors give the linear part, frame and payload the quadratic one; the linear part lies within what is measured on
     multirotors (0.2 to 0.55 1/s: Faessler et al., IEEE RA-L 2018), and hovering in 8 m/s takes 24 degrees of tilt.
     `disk_area_m2` and `figure_of_merit` set the power that thrust costs (momentum theory). `radius_m` is the sphere
-    around its centre that nothing may come into: half the diagonal and a propeller's radius.
+    around its centre that nothing may come into: half the diagonal and a propeller's radius. `rotors` are where each
+    one is, forward and right of the middle [m], and its torque about the vertical [m, of its thrust]; they matter only
+    where one of them is weak.
     """
 
     mass_kg: float = 2.4
@@ -42,6 +58,7 @@ class Airframe:
     disk_area_m2: float = 6 * math.pi * (0.239 / 2) ** 2
     figure_of_merit: float = 0.42
     radius_m: float = 0.40
+    rotors: _Rotors = _F550_ROTORS
     pack: Pack = _F550_PACK
 
     @property
@@ -66,6 +83,7 @@ X500 = Airframe(
     disk_area_m2=4 * math.pi * 0.127**2,
     figure_of_merit=0.50,
     radius_m=0.38,
+    rotors=_ring(4, 0.246, math.pi / 4),
     pack=Pack(n_cells=4, capacity_ah=5.0, resistance_ohm=0.018),
 )
 """Holybro X500 V2 with its payload: 500 mm, four 10-inch propellers, 4S 5 Ah.

@@ -34,6 +34,7 @@ class Vehicle:
 
     __slots__ = (
         "_torque_n_m",
+        "_weakness",
         "acceleration_m_s2",
         "airframe",
         "ground",
@@ -63,6 +64,16 @@ class Vehicle:
         self.is_on_ground = True
         self.is_broken = False
         self.supply = 1.0
+        self._weakness = (0.0, 0.0, 0.0, 0.0)
+
+    def weaken(self, rotor: int, share: float) -> None:
+        """Let one of the airframe's rotors give only a `share` of what is asked of it, 0 to 1: 1 mends it.
+
+        A worn bearing, a chipped propeller, a speed controller that has lost step: the autopilot does not know.
+        """
+        forward_m, right_m, drag_m = self.airframe.rotors[rotor]
+        loss = (1.0 - share) / len(self.airframe.rotors)
+        self._weakness = (loss, loss * right_m, -loss * forward_m, -loss * drag_m)
 
     @property
     def euler_rad(self) -> Vector:
@@ -104,6 +115,9 @@ class Vehicle:
         ty += lag * (min(max(torque[1], -authority), authority) * my - ty)
         tz += lag * (min(max(torque[2], -authority), authority) * mz - tz)
         self._torque_n_m = (tx, ty, tz)
+        lost, lost_x_m, lost_y_m, lost_z_m = self._weakness
+        thrust_n = self.thrust_n
+        tx, ty, tz = tx + thrust_n * lost_x_m, ty + thrust_n * lost_y_m, tz + thrust_n * lost_z_m
 
         w, x, y, z = self.quaternion
         # Third column of the rotation matrix: body z (down) in NED.
@@ -111,7 +125,7 @@ class Vehicle:
         vn, ve, vd = self.velocity_m_s
         an, ae, ad = vn - wind_m_s[0], ve - wind_m_s[1], vd - wind_m_s[2]
         drag = frame.linear_drag_1_s + frame.quadratic_drag_1_m * math.sqrt(an * an + ae * ae + ad * ad)
-        lift = self.thrust_n / frame.mass_kg
+        lift = (1.0 - lost) * self.thrust_n / frame.mass_kg
         acceleration = (-drag * an - lift * zn, -drag * ae - lift * ze, -drag * ad - lift * zd + GRAVITY_M_S2)
         n, e, d = self.position_m
         ground_m = self.ground(n, e)

@@ -1,5 +1,6 @@
 """Read a flight back from its log, also from one that was cut off when the power went."""
 
+import json
 from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -9,6 +10,7 @@ from typing import Any, BinaryIO
 import numpy as np
 from pydantic import ValidationError
 
+from drivers.camera.camera import Intrinsics
 from drivers.mcap_stream import IMAGE_DATA_FIELD, IMAGE_TOPIC, MAGIC, bytes_field, open_messages, whole_records
 from mission.autopilot import VehicleState
 from mission.log import channels
@@ -61,6 +63,15 @@ class Flight:
     attachments: dict[str, bytes]
     end_ns: int
     is_truncated: bool
+
+    @property
+    def camera(self) -> Intrinsics | None:
+        """The camera that the log's frames are from; None where the log does not tell."""
+        text = self.attachments.get("camera.json") or self.mission.metadata.get("camera_intrinsics")
+        if text is None:
+            return None
+        fields = json.loads(text)
+        return Intrinsics(**fields | {"distortion": tuple(fields["distortion"])})
 
 
 def read_flight(path: Path, *, with_images: bool = False) -> Flight:

@@ -41,11 +41,19 @@ def see_line(
     line_point_ned_m: tuple[float, float, float],
     line_heading_rad: float,
     t_capture_ns: int = 0,
+    *,
+    askew_rad: float = 0.0,
 ) -> LineEstimate | None:
-    """The estimate of a straight level line; None where it does not cross the image."""
+    """The estimate of a straight level line; None where it does not cross the image.
+
+    `askew_rad` is by how much the camera is rolled to the right on its mount, which nobody knows of.
+    """
     along = np.array([math.cos(line_heading_rad), math.sin(line_heading_rad), 0.0])
     points = np.array(line_point_ned_m) + _REACHES_M[:, None] * along - np.array(position_ned_m)
     body = points @ rotation_ned_from_frd(quaternion)  # the inverse rotation of each row
+    right, down = body[:, 1].copy(), body[:, 2].copy()
+    body[:, 1] = math.cos(askew_rad) * right + math.sin(askew_rad) * down
+    body[:, 2] = math.cos(askew_rad) * down - math.sin(askew_rad) * right
     body = body[body[:, 2] > 0.2]
     x = camera.cx_px + camera.fx_px * body[:, 1] / body[:, 2]
     y = camera.cy_px - camera.fy_px * body[:, 0] / body[:, 2]
@@ -70,7 +78,8 @@ def bare_report(seq: int, t_capture_ns: int, estimate: LineEstimate | None, late
 class GeometricEyes:
     """mission.eyes.Eyes over a straight line. `is_blind` shows no line, `is_silent` sends no report.
 
-    `failure` is a dead worker, `impairment` a camera that is gone or blind.
+    `failure` is a dead worker, `impairment` a camera that is gone or blind. `latency_ns` is from a frame to its report,
+    `stamp_late_ns` by how much later than it was taken a frame says that it was, `askew_rad` as for `see_line`.
     """
 
     def __init__(
@@ -88,9 +97,12 @@ class GeometricEyes:
         self._heading_rad = line_heading_rad
         self._next_ns = 0
         self._seq = 0
-        self._pending: list[VisionReport] = []
+        self._pending: list[tuple[int, VisionReport]] = []
         self.is_blind = False
         self.is_silent = False
+        self.latency_ns = LATENCY_NS
+        self.stamp_late_ns = 0
+        self.askew_rad = 0.0
         self.failure: str | None = None
         self.missing: str | None = None
         self.impairment: Notice | None = None
@@ -105,12 +117,22 @@ class GeometricEyes:
             self._next_ns = now_ns + FRAME_PERIOD_NS
             position_m, quaternion = pose
             estimate = None
+            stamp_ns = now_ns + self.stamp_late_ns
             if not self.is_blind:
-                estimate = see_line(position_m, quaternion, self._camera, self._point, self._heading_rad, now_ns)
-            self._pending.append(bare_report(self._seq, now_ns, estimate, LATENCY_NS))
+                estimate = see_line(
+                    position_m,
+                    quaternion,
+                    self._camera,
+                    self._point,
+                    self._heading_rad,
+                    stamp_ns,
+                    askew_rad=self.askew_rad,
+                )
+            report = bare_report(self._seq, stamp_ns, estimate, self.latency_ns)
+            self._pending.append((stamp_ns + self.latency_ns, report))
             self._seq += 1
-        due = [report for report in self._pending if now_ns - report.t_capture_ns >= LATENCY_NS]
-        self._pending = [report for report in self._pending if now_ns - report.t_capture_ns < LATENCY_NS]
+        due = [report for due_ns, report in self._pending if now_ns >= due_ns]
+        self._pending = [(due_ns, report) for due_ns, report in self._pending if now_ns < due_ns]
         return due
 
     def take_notices(self) -> list[Notice]:

@@ -1,0 +1,137 @@
+"""Blame by causing it: what was done to a flight is what its log says was done."""
+
+import math
+import random
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+import yaml
+
+from mission.log.blame.blame import find_excursions
+from mission.log.blame.records import Culprit, Excursion, Fault
+from mission.plan import MissionPlan
+from sitl.gust_front import GustFronts, one_minus_cosine
+from sitl.wind import Wind
+from tests.support.flights import LINE_HEADING_RAD, Cockpit
+from tests.support.logged_flight import fly_and_log
+
+PLAN = MissionPlan.model_validate(
+    yaml.safe_load(
+        """
+version: 1
+name: blamed
+tasks:
+  - {task: takeoff, altitude_m: 5}
+  - {task: ascend, altitude_m: 16}
+  - {task: move_until}
+  - {task: align, turn: right}
+  - {task: follow_lines, distance_m: 35}
+  - {task: return}
+safety: {line_height_m: 10.3, line_lost_s: 4.0}
+"""
+    )
+)
+SEEDS = tuple(range(1, 11))
+MEAN_WIND_M_S = 4.0
+
+
+class OneGust(GustFronts):
+    """A single gust from where the wind blows, `strength` times the mean, which comes when it is told to."""
+
+    def __init__(self, strength: float) -> None:
+        self._strength = strength
+        self._since_s = -1.0
+
+    def begin(self) -> None:
+        self._since_s = 0.0
+
+    def step(self, dt_s: float, travelled_m: float) -> tuple[float, float]:
+        if self._since_s < 0.0:
+            return (0.0, 0.0)
+        self._since_s += dt_s
+        share = one_minus_cosine(self._since_s, 0.8) - one_minus_cosine(self._since_s - 3.0, 1.5)
+        return (share * self._strength, 0.0)
+
+
+def fly(
+    path: Path, seed: int, do: Callable[[Cockpit], None], gust: OneGust | None = None, *, has_truth: bool = True
+) -> tuple[Excursion, ...]:
+    """Fly along the line in a wind that comes from somewhere abeam; `do` is done four seconds into the leg."""
+    draw = random.Random(f"blame {seed}")
+    abeam_rad = LINE_HEADING_RAD + math.copysign(math.pi / 2, draw.random() - 0.5) + draw.uniform(-0.6, 0.6)
+    wind = Wind(MEAN_WIND_M_S, seed, abeam_rad, fronts=gust)
+    flight = fly_and_log(
+        path, PLAN, wind=wind, seed=seed, in_task="follow_lines", after_s=4.0, do=do, has_truth=has_truth
+    )
+    return find_excursions(flight)
+
+
+def bias_camera(cockpit: Cockpit, draw: random.Random) -> None:
+    cockpit.eyes.askew_rad = math.copysign(math.radians(draw.uniform(10.0, 14.0)), draw.random() - 0.5)
+
+
+def delay(cockpit: Cockpit, draw: random.Random) -> None:
+    """Estimates come later than they may steer."""
+    cockpit.eyes.latency_ns = round(draw.uniform(0.7, 1.2) * 1e9)
+
+
+def misdate(cockpit: Cockpit, draw: random.Random) -> None:
+    """Frames say that they were taken later than they were."""
+    cockpit.eyes.stamp_late_ns = round(draw.uniform(0.4, 0.6) * 1e9)
+
+
+def weaken(cockpit: Cockpit, draw: random.Random) -> None:
+    vehicle = cockpit.autopilot.sim.vehicle
+    vehicle.weaken(draw.randrange(len(vehicle.airframe.rotors)), draw.uniform(0.0, 0.2))
+
+
+CAUSES: dict[str, tuple[Callable[[Cockpit, random.Random], None], Culprit, Fault]] = {
+    "biased camera": (bias_camera, Culprit.PERCEPTION, Fault.WRONG),
+    "delayed estimate": (delay, Culprit.PERCEPTION, Fault.LATE),
+    "misdated frames": (misdate, Culprit.PERCEPTION, Fault.LATE),
+    "weak motor": (weaken, Culprit.AUTOPILOT, Fault.TRACKING),
+}
+
+
+@pytest.mark.parametrize("cause", CAUSES)
+def test_what_was_done_is_what_is_blamed(cause: str, tmp_path: Path) -> None:
+    act, culprit, fault = CAUSES[cause]
+    named = {}
+    for seed in SEEDS:
+        draw = random.Random(f"{cause} {seed}")
+        named[seed] = fly(tmp_path / f"{seed}.mcap", seed, lambda cockpit, draw=draw: act(cockpit, draw))
+    check(named, culprit, fault)
+
+
+def test_a_gust_is_blamed_on_the_wind(tmp_path: Path) -> None:
+    named = {}
+    for seed in SEEDS:
+        gust = OneGust(random.Random(f"gust {seed}").uniform(1.5, 2.0))
+        named[seed] = fly(tmp_path / f"{seed}.mcap", seed, lambda _, gust=gust: gust.begin(), gust)
+    check(named, Culprit.WIND, Fault.PUSHED)
+
+
+@pytest.mark.parametrize("cause", ["delayed estimate", "misdated frames", "weak motor"])
+def test_without_truth_the_same_is_blamed(cause: str, tmp_path: Path) -> None:
+    act, culprit, fault = CAUSES[cause]
+    draw = random.Random(f"{cause} 1")
+    found = fly(tmp_path / "1.mcap", 1, lambda cockpit: act(cockpit, draw), has_truth=False)
+    assert {(excursion.culprit, excursion.fault) for excursion in found} == {(culprit, fault)}
+
+
+def test_without_truth_a_gust_is_blamed_on_the_wind(tmp_path: Path) -> None:
+    gust = OneGust(2.0)
+    found = fly(tmp_path / "1.mcap", 1, lambda _: gust.begin(), gust, has_truth=False)
+    assert {(excursion.culprit, excursion.fault) for excursion in found} == {(Culprit.WIND, Fault.PUSHED)}
+
+
+def test_nobody_is_blamed_for_a_flight_without_trouble(tmp_path: Path) -> None:
+    for seed in SEEDS[:4]:
+        assert fly(tmp_path / f"{seed}.mcap", seed, lambda _: None) == ()
+
+
+def check(named: dict[int, tuple[Excursion, ...]], culprit: Culprit, fault: Fault) -> None:
+    """What is told of first is what was caused, in nine of ten flights."""
+    right = [seed for seed, found in named.items() if found and (found[0].culprit, found[0].fault) == (culprit, fault)]
+    assert len(right) >= 9, {seed: found for seed, found in named.items() if seed not in right}
