@@ -8,11 +8,10 @@ from typing import Annotated, Literal
 
 import typer
 
-from mission import fly_commands
+from mission import fly_commands, inspect_commands
 from mission.camera_commands import app as camera_app
-from mission.ending import EXIT_BAD_INPUT, EXIT_FAILED_FILE, EXIT_FAULT, fail, print_report, read_mission, read_report
-from mission.fly_commands import JsonOption, MissionArgument
-from mission.log.errors import LogError
+from mission.ending import EXIT_BAD_INPUT, EXIT_FAILED_FILE, EXIT_FAULT, fail, read_mission
+from mission.fly_commands import MissionArgument
 from mission.simulated.world_commands import app as world_app
 from mission.simulated.world_pictures import app as pictures_app
 
@@ -35,6 +34,7 @@ app.command("dry-run")(fly_commands.dry_run)
 app.command()(fly_commands.run)
 app.command()(fly_commands.resume)
 app.command()(fly_commands.sitl)
+app.command()(inspect_commands.inspect)
 
 
 def main() -> None:
@@ -94,16 +94,6 @@ def detect(
         fail(str(error), EXIT_BAD_INPUT)
     if n_unreadable:
         raise typer.Exit(EXIT_FAILED_FILE)
-
-
-@app.command()
-def inspect(log: Annotated[Path, typer.Argument(help="A flight log (.mcap).")], as_json: JsonOption = False) -> None:
-    """Say what happened in a flight."""
-    try:
-        report = read_report(log)
-    except LogError as error:
-        fail(str(error), EXIT_BAD_INPUT)
-    print_report(report, as_json=as_json)
 
 
 if __name__ == "__main__":

@@ -54,10 +54,10 @@ def read_mission(path: Path) -> "MissionFile":
 
 def read_report(log: Path) -> "FlightReport":
     """Work out the report of a flight log; raises LogError."""
+    from mission.log.inspection import inspect_flight
     from mission.log.reader import read_flight
-    from mission.log.summary import summarise
 
-    return summarise(read_flight(log))
+    return inspect_flight(read_flight(log))
 
 
 def print_report(report: "FlightReport", *, as_json: bool) -> None:

@@ -38,7 +38,7 @@ class Flight:
     """All that a log holds, each stream in the order of its times; flight time [ns] throughout.
 
     `is_truncated` says that the log was never closed: the program or the computer died. `reports` carry their JPEGs
-    only when the flight was read with images.
+    only when the flight was read with images; `image_times_ns` tells of which frames the log has one.
     """
 
     path: Path
@@ -61,6 +61,7 @@ class Flight:
     syncs: tuple[ClockSync, ...]
     health: tuple[LogHealth, ...]
     attachments: dict[str, bytes]
+    image_times_ns: frozenset[int]
     end_ns: int
     is_truncated: bool
 
@@ -168,6 +169,7 @@ def _flight(
         syncs=tuple(streams[ClockSync]),
         health=tuple(streams[LogHealth]),
         attachments=attachments,
+        image_times_ns=frozenset(entry.t_ns for entry in streams[VisionEntry] if entry.has_image),
         end_ns=max([mission.start_ns, *times_ns]),
         is_truncated=is_truncated,
     )

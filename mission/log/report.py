@@ -2,10 +2,11 @@
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
+from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
-from mission.log.summary import UNFINISHED, EventSummary, FlightReport, TaskSummary
+from mission.log.summary import UNFINISHED, EventSummary, ExcursionSummary, FlightReport, TaskSummary
 from mission.log.wording import words_of
 from mission.records import Result, Severity
 
@@ -28,6 +29,8 @@ def print_report(report: FlightReport, console: Console) -> None:
     if report.is_truncated:
         console.print(Text("The log was cut off; this is what it still holds.", style="yellow"), width=width)
     is_troubled = any(event.severity != Severity.INFO for event in report.events)
+    if report.excursions:
+        _print_excursions(report.excursions, console, width)
     if is_troubled:
         _print_events(report.events, console, width)
     if report.tasks:
@@ -52,6 +55,20 @@ def _print_events(events: tuple[EventSummary, ...], console: Console, width: int
         name = Text(words_of(event.name), style=_SEVERITY_STYLE[Severity(event.severity)])
         table.add_row(f"{event.t_s:.1f} s", name, Text(event.message), Text(words_of(event.reaction)))
     console.print(table)
+
+
+def _print_excursions(excursions: tuple[ExcursionSummary, ...], console: Console, width: int) -> None:
+    console.print()
+    console.print(Text("What went wrong", style="bold"), width=width)
+    for one in excursions:
+        words = Text.assemble(
+            ("  " + words_of(one.kind), "yellow"),
+            f" {one.peak:.2f} {one.unit}, {one.start_s:.1f} s to {one.end_s:.1f} s: ",
+            (f"{one.culprit}, {one.fault}", "bold"),
+        )
+        console.print(words, width=width)
+        for line in one.evidence:
+            console.print(Padding(Text(line, style="dim"), (0, 0, 0, 4)), width=width)
 
 
 def _task_table(tasks: tuple[TaskSummary, ...], width: int) -> Table:

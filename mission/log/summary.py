@@ -127,10 +127,27 @@ class EventSummary:
 
 
 @dataclass(frozen=True, slots=True)
+class ExcursionSummary:
+    """Something that went beyond its limit, and whose fault it was (mission/log/blame/records.py); `t` [s]."""
+
+    kind: str
+    task: str
+    start_s: float
+    end_s: float
+    peak: float
+    unit: str
+    culprit: str
+    fault: str
+    shares: dict[str, float]
+    evidence: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class FlightReport:
     """A flight in figures. Times [s] are since the flight's start (`flight_start_ns`).
 
-    `lateral` and `yaw_error` need ground truth, which only a simulated flight has.
+    `lateral` and `yaw_error` need ground truth, which only a simulated flight has. `excursions` are empty where nobody
+    looked for them (mission/log/inspection.py does).
     """
 
     mission: str
@@ -147,6 +164,7 @@ class FlightReport:
     setpoints: SetpointSummary
     landing: LandingSummary | None
     events: tuple[EventSummary, ...]
+    excursions: tuple[ExcursionSummary, ...] = ()
 
 
 def summarise(flight: Flight) -> FlightReport:

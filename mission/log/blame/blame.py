@@ -33,7 +33,8 @@ _BEFORE_S = 2.0
 _OLD_S = 0.3  # latency over which an estimate is late
 _GONE_SHARE = 0.5  # of an excursion, without news of the line
 _NEWS_S = 0.5
-_STILL_RAD = math.radians(2.0)  # a setpoint whose yaw moves by less within a second stands still
+_STILL_RAD, _STILL_S = math.radians(2.0), 2.0  # a setpoint whose yaw moves by less within this time stands still
+_TURNED_RAD = math.radians(8.0)  # the line as told, at a bend
 _TILT_LIMIT_RAD = math.radians(38.0)
 _VIEW_SHARE = 0.85  # of half the picture's width: further out a line is too short to be found
 _OUT_OF_VIEW_SHARE = 0.3  # of the time unseen, in which the line was out of the picture
@@ -57,6 +58,11 @@ class _Leg:
     depth_m: float | None
     view: Floats | None
 
+    @property
+    def has_estimates(self) -> bool:
+        """Whether vision told of a line. A log that then lacks its place is older than that stream."""
+        return any(report.estimate is not None for report in self.reports)
+
 
 def find_excursions(flight: Flight, limits: Limits = DEFAULT_LIMITS) -> tuple[Excursion, ...]:
     """All excursions of a flight while it followed its line, in the order of their times."""
@@ -69,7 +75,8 @@ def find_excursions(flight: Flight, limits: Limits = DEFAULT_LIMITS) -> tuple[Ex
             continue
         leg = _leg(flight, whole, span)
         if len(leg.motion.t_ns) >= 2:
-            for find in (_off_line, _unseen, _misdated, _off_height, _off_heading):
+            finders = (_off_line, _unseen, _misdated) if flight.fixes or not leg.has_estimates else ()
+            for find in (*finders, _off_height, _off_heading):
                 found.extend(find(leg, limits))
     return tuple(sorted(found, key=lambda excursion: (excursion.start_ns, excursion.kind)))
 
@@ -206,6 +213,12 @@ def _of_tracking(motion: Motion, lateral: Lateral, peak: int, side: float) -> tu
     before = pushed[int(np.searchsorted(motion.t_ns, motion.t_ns[first] - round(_BEFORE_S * NS_PER_S))) : first + 1]
     steady = float(np.median(before))  # what the thrust was balancing when it began: a lull moves a vehicle, too
     during = slice(first, peak + 1)
+    moved_m = float(
+        -side * (motion.setpoint_m[during][-1, :2] - motion.setpoint_m[during][0, :2]) @ lateral.right[peak]
+    )
+    turned_rad = float(np.ptp(np.unwrap(np.arctan2(*lateral.right[during].T))))
+    if turned_rad > _TURNED_RAD or moved_m > 0.5 * abs(tracking_m[peak]):
+        return Culprit.EXECUTIVE, Fault.SETPOINT, (_moved_words(moved_m, turned_rad),)
     t_s = motion.t_ns[during] / NS_PER_S
     push_m_s = float(np.trapezoid(pushed[during] - steady, t_s))
     thrust_m_s = float(np.trapezoid(thrust[during] + steady, t_s))
@@ -356,10 +369,11 @@ def _off_heading(leg: _Leg, limits: Limits) -> Iterator[Excursion]:
 
 
 def _is_still(motion: Motion) -> NDArray[np.bool_]:
-    """Where the setpoint's yaw has hardly moved within the last second."""
-    before = np.searchsorted(motion.t_ns, motion.t_ns - NS_PER_S)
-    moved_rad = np.abs(_wrapped(motion.setpoint_yaw_rad - motion.setpoint_yaw_rad[np.minimum(before, len(before) - 1)]))
-    return np.asarray(np.nan_to_num(moved_rad, nan=np.inf) < _STILL_RAD)
+    """Where the setpoint's yaw has hardly moved for a while; not at the leg's beginning, which may follow a turn."""
+    then_ns = motion.t_ns - round(_STILL_S * NS_PER_S)
+    before = np.searchsorted(motion.t_ns, then_ns)
+    moved_rad = np.abs(_wrapped(motion.setpoint_yaw_rad - motion.setpoint_yaw_rad[before]))
+    return np.asarray((np.nan_to_num(moved_rad, nan=np.inf) < _STILL_RAD) & (then_ns >= motion.t_ns[0]))
 
 
 # -- words -----------------------------------------------------------------------------------------------------------
@@ -379,6 +393,15 @@ def _lag_words(lag: ImageLag) -> str:
         f"frames show where the vehicle was {lag.lag_s * 1e3:.0f} ms before the time that they bear: with that the "
         f"line scatters by {100 * lag.residual:.0f} % of what it does without"
     )
+
+
+def _moved_words(moved_m: float, turned_rad: float) -> str:
+    if turned_rad > _TURNED_RAD:
+        return (
+            f"the line as told turned by {math.degrees(turned_rad):.0f} degrees here, and the setpoint went over to "
+            "the new span at once: the vehicle came behind it"
+        )
+    return f"the setpoint went {moved_m:.2f} m aside, and the vehicle came behind it"
 
 
 def _side(right: float) -> str:

@@ -1,0 +1,141 @@
+"""The curves of a flight's page: values over time, thinned for the eye."""
+
+import itertools
+import math
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.clock import NS_PER_S
+from mission.log.blame.signals import Lateral, Motion, lateral_of
+from mission.log.measures import nearest_on_axis
+from mission.log.page.thinning import evenly, extremes
+from mission.log.reader import Flight
+from mission.log.summary import FOLLOW_TASK, task_spans, true_axis
+
+Floats = NDArray[np.float64]
+Seconds = Callable[[Sequence[int]], Floats]
+
+_CURVE_POINTS = 1_600
+_NEAR_LINE_M = 6.0
+
+
+def listed(values: Floats, digits: int = 3) -> list[float | None]:
+    """Rounded numbers for JSON, which has no NaN."""
+    return [round(value, digits) if math.isfinite(value) else None for value in values.tolist()]
+
+
+def _curve(t_s: Floats, values: Floats, digits: int = 3) -> dict[str, Any]:
+    kept = extremes(values, _CURVE_POINTS)
+    return {"t": listed(t_s[kept]), "y": listed(values[kept], digits)}
+
+
+def flight_curves(flight: Flight, motion: Motion, start_ns: int) -> dict[str, Any]:
+    """Each curve by name: times and values; what the log does not hold is absent."""
+
+    def s(times_ns: Sequence[int]) -> Floats:
+        return (np.array(times_ns, dtype=np.int64) - start_ns) / NS_PER_S
+
+    t_s = s(motion.t_ns.tolist())
+    curves = {
+        "height": _curve(t_s, -motion.position_m[:, 2]),
+        "height_setpoint": _curve(t_s, -motion.setpoint_m[:, 2]),
+        "from_setpoint": _curve(t_s, np.linalg.norm(motion.position_m - motion.setpoint_m, axis=1)),
+        "tilt_deg": _curve(t_s, np.degrees(motion.tilt_rad), 1),
+        "push": _curve(t_s, np.linalg.norm(motion.push_m_s2, axis=1)),
+        "speed": _curve(
+            s([state.t_ns for state in flight.states]),
+            np.array([math.hypot(state.v_north_m_s, state.v_east_m_s) for state in flight.states]),
+        ),
+        "battery": _curve(
+            s([state.t_ns for state in flight.states]),
+            np.array([np.nan if state.battery is None else 100.0 * state.battery for state in flight.states]),
+            1,
+        ),
+        **_lateral_curves(flight, motion, t_s),
+        **_vision_curves(flight, s),
+    }
+    if flight.ticks:
+        ticks_s = s([tick.t_ns for tick in flight.ticks])
+        curves["tick_late_ms"] = _curve(ticks_s, np.array([1e3 * tick.late_s for tick in flight.ticks]), 1)
+        curves["telemetry_age_ms"] = _curve(ticks_s, np.array([1e3 * tick.state_age_s for tick in flight.ticks]), 1)
+    if flight.syncs:
+        curves["round_trip_ms"] = _curve(
+            s([sync.t_ns for sync in flight.syncs]), np.array([sync.round_trip_ns / 1e6 for sync in flight.syncs]), 1
+        )
+    over = _height_over_line(flight)
+    if over is not None:
+        times_ns, over_m = over
+        curves["height_over_line"] = _curve(s(times_ns), over_m)
+    depths = [fix for fix in flight.fixes if fix.depth_m is not None]
+    if depths:
+        curves["height_over_line_known"] = _curve(
+            s([fix.t_ns for fix in depths]), np.array([fix.depth_m for fix in depths], dtype=np.float64)
+        )
+    return {name: curve for name, curve in curves.items() if any(value is not None for value in curve["y"])}
+
+
+def _lateral_curves(flight: Flight, motion: Motion, t_s: Floats) -> dict[str, Any]:
+    """The way off the line and its parts, in the tasks that follow it."""
+    lateral = lateral_of(flight, motion)
+    is_following = np.zeros(len(motion.t_ns), dtype=np.bool_)
+    for span in task_spans(flight):
+        if span.task == FOLLOW_TASK:
+            end_ns = flight.end_ns if span.end_ns is None else span.end_ns
+            is_following |= (motion.t_ns >= span.start_ns) & (motion.t_ns <= end_ns)
+
+    def part(values: Floats) -> dict[str, Any]:
+        return _curve(t_s, np.where(is_following, values, np.nan))
+
+    named = {"off_line": lateral.off_m, "executive": lateral.executive_m, "tracking": lateral.tracking_m}
+    if lateral.is_true:
+        named |= {"perception": lateral.perception_m}
+    return {name: part(values) for name, values in named.items()} if _has_any(lateral) else {}
+
+
+def _has_any(lateral: Lateral) -> bool:
+    return bool(np.isfinite(lateral.off_m).any())
+
+
+def _vision_curves(flight: Flight, s: Seconds) -> dict[str, Any]:
+    estimates = [report.estimate for report in flight.reports if report.estimate is not None]
+    curves = {
+        "latency_ms": _curve(
+            s([report.t_capture_ns for report in flight.reports]),
+            np.array([report.latency_ns / 1e6 for report in flight.reports]),
+            1,
+        )
+    }
+    if estimates:
+        times_s = s([estimate.t_capture_ns for estimate in estimates])
+        curves["angle_deg"] = _curve(times_s, np.degrees([estimate.angle_rad for estimate in estimates]), 2)
+        curves["offset_px"] = _curve(times_s, np.array([estimate.offset_px for estimate in estimates]), 1)
+    return curves
+
+
+def _height_over_line(flight: Flight) -> tuple[list[int], Floats] | None:
+    """Times [ns] and the true height over the highest conductor nearby, NaN away from the line; None: unknown."""
+    if flight.line is None or not flight.truth or not flight.line.conductors_ned_m:
+        return None
+    poses = [flight.truth[k] for k in evenly(len(flight.truth), _CURVE_POINTS).tolist()]
+    ne_m = np.array([(pose.north_m, pose.east_m) for pose in poses])
+    up_m = np.array([-pose.down_m for pose in poses])
+    aside_m, _ = nearest_on_axis(ne_m, true_axis(flight.line))
+    points = np.concatenate([_dense(np.array(conductor)) for conductor in flight.line.conductors_ned_m])
+    over_m = np.full(len(ne_m), np.nan)
+    for k in np.flatnonzero(np.abs(aside_m) < _NEAR_LINE_M).tolist():
+        near = ((points[:, :2] - ne_m[k]) ** 2).sum(axis=1) < _NEAR_LINE_M**2
+        if near.any():
+            over_m[k] = up_m[k] + points[near, 2].min()
+    return [pose.t_ns for pose in poses], over_m
+
+
+def _dense(polyline: Floats) -> Floats:
+    """A polyline (m, 3) with a point at least every 3 m."""
+    pieces = []
+    for start, end in itertools.pairwise(polyline):
+        n = max(2, math.ceil(float(np.linalg.norm(end - start)) / 3.0) + 1)
+        pieces.append(start + np.linspace(0.0, 1.0, n)[:, None] * (end - start))
+    return np.concatenate(pieces) if pieces else polyline
