@@ -11,6 +11,7 @@ import typer
 from mission import fly_commands, inspect_commands
 from mission.camera_commands import app as camera_app
 from mission.ending import EXIT_BAD_INPUT, EXIT_FAILED_FILE, EXIT_FAULT, fail, read_mission
+from mission.export_commands import app as export_app
 from mission.fly_commands import MissionArgument
 from mission.simulated.world_commands import app as world_app
 from mission.simulated.world_pictures import app as pictures_app
@@ -24,6 +25,7 @@ app = typer.Typer(
 )
 
 app.add_typer(camera_app, name="camera")
+app.add_typer(export_app, name="export")
 world_app.add_typer(pictures_app)  # without a name of its own: its commands stand beside the others
 app.add_typer(world_app, name="world")
 

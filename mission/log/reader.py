@@ -3,6 +3,7 @@
 import json
 from collections import defaultdict
 from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, BinaryIO
@@ -80,32 +81,60 @@ def read_flight(path: Path, *, with_images: bool = False) -> Flight:
 
     Raises LogError when `path` is not the log of a flight, or is damaged.
     """
-    if path.is_dir():
-        raise LogError(f"{path} is a folder; name one of the .mcap files in it.")
+    streams: dict[type, list[Any]] = defaultdict(list)
+    jpegs: dict[int, bytes] = {}
+    attachments: dict[str, bytes] = {}
+    with _opened(path) as file:
+        _, is_closed = whole_records(file)
+        for topic, log_time_ns, content in _contents(path, file, attachments):
+            if topic in channels.CHANNEL_AT:
+                streams[type(content)].append(content)
+            elif with_images:
+                jpegs[log_time_ns] = content
+    return _flight(path, streams, jpegs, attachments, is_truncated=not is_closed)
+
+
+def stream_log(path: Path) -> Iterator[tuple[str, int, Any]]:
+    """Topic, log time [ns, Unix] and content of what a log holds, in the order written, without holding it.
+
+    The content is a record where the topic is one of RECORD_CHANNELS, and a frame's JPEG where it is IMAGE_TOPIC;
+    there are no others. Raises LogError as `read_flight` does.
+    """
+    with _opened(path) as file:
+        yield from _contents(path, file, {})
+
+
+@contextmanager
+def _opened(path: Path) -> Iterator[BinaryIO]:
+    """The file of a log. Raises LogError where it is none, or cannot be read any more."""
     try:
+        if path.is_dir():
+            raise LogError(f"{path} is a folder; name one of the .mcap files in it.")
         with path.open("rb") as file:
-            return _read(path, file, with_images)
+            magic = file.read(len(MAGIC))
+            if not magic:
+                raise LogError(f"The log {path} is empty; the flight ended before anything was written to it.")
+            if magic != MAGIC:
+                raise LogError(f"{path} is not an MCAP file; name a log that lineflight wrote (.mcap).")
+            yield file
     except OSError as error:
         raise LogError(f"The log {path} cannot be read ({error.strerror}); check its name and its rights.") from error
 
 
-def _read(path: Path, file: BinaryIO, with_images: bool) -> Flight:
-    magic = file.read(len(MAGIC))
-    if not magic:
-        raise LogError(f"The log {path} is empty; the flight ended before anything was written to it.")
-    if magic != MAGIC:
-        raise LogError(f"{path} is not an MCAP file; name a log that lineflight wrote (.mcap).")
-    _, is_closed = whole_records(file)
+def _contents(path: Path, file: BinaryIO, attachments: dict[str, bytes]) -> Iterator[tuple[str, int, Any]]:
+    """What `stream_log` yields, of an open log; fills `attachments` by name."""
+    has_mission = False
     file.seek(0)
-    streams: dict[type, list[Any]] = defaultdict(list)
-    jpegs: dict[int, bytes] = {}
-    attachments: dict[str, bytes] = {}
     try:
         for topic, log_time_ns, body in open_messages(file, attachments):
             if topic in channels.CHANNEL_AT:
-                streams[channels.CHANNEL_AT[topic].record].append(channels.decode(topic, body))
-            elif with_images and topic == IMAGE_TOPIC:
-                jpegs[log_time_ns] = bytes_field(body, IMAGE_DATA_FIELD)
+                record = channels.decode(topic, body)
+                has_mission = has_mission or isinstance(record, LoggedMission)
+                yield topic, log_time_ns, record
+            elif topic == IMAGE_TOPIC:
+                yield topic, log_time_ns, bytes_field(body, IMAGE_DATA_FIELD)
+    except OSError:
+        raise
     except ValidationError as error:
         first = error.errors()[0]
         raise LogError(
@@ -114,9 +143,8 @@ def _read(path: Path, file: BinaryIO, with_images: bool) -> Flight:
         ) from error
     except Exception as error:  # the decompressor, the decoder and the parser each have their own
         raise LogError(f"The log {path} is damaged ({type(error).__name__}: {error}); recover it with mcap.") from error
-    if not streams[LoggedMission]:
+    if not has_mission:
         raise LogError(f"{path} holds no mission; it is not the log of a flight, or was cut off at its very start.")
-    return _flight(path, streams, jpegs, attachments, is_truncated=not is_closed)
 
 
 def read_images(flight: Flight) -> Iterator[tuple[int, bytes]]:

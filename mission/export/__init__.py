@@ -1,0 +1,1 @@
+"""A flight log for other programs: tables, maps, and images for reconstruction."""
