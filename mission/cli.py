@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from mission import fly_commands
+from mission import fly_commands, import_commands
 from mission.camera_commands import app as camera_app
 from mission.ending import EXIT_BAD_INPUT, EXIT_FAILED_FILE, EXIT_FAULT, fail, print_report, read_mission, read_report
 from mission.fly_commands import JsonOption, MissionArgument
@@ -35,6 +35,7 @@ app.command("dry-run")(fly_commands.dry_run)
 app.command()(fly_commands.run)
 app.command()(fly_commands.resume)
 app.command()(fly_commands.sitl)
+app.command("import")(import_commands.import_log)
 
 
 def main() -> None:
