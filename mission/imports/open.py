@@ -88,7 +88,7 @@ def _read_packed_telemetry(path: Path, tell: Tell) -> list[AutopilotLog]:
                         raise AutopilotLogError(f"{path} unpacks to more than 4 GiB; that is no telemetry log.")
                     file.write(block)
         except (lzma.LZMAError, EOFError) as error:
-            raise AutopilotLogError(f"{path} cannot be unpacked ({error}); is it whole, and made by xz?") from error
+            raise AutopilotLogError(f"{path} cannot be unpacked ({error}); fetch it once more.") from error
         return _read_telemetry_named(path, unpacked, tell)
 
 
