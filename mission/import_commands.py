@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from mission.log.imported import ImportedLog
     from mission.log.reader import Flight
 
+_FAR_M = 0.5  # one estimate does not differ by so much from itself
+
 
 def import_log(
     log: Annotated[Path, typer.Argument(help="A flight log (.mcap).")],
@@ -53,6 +55,11 @@ def import_log(
         fail(str(error), EXIT_FAILED_FILE)
     if alignment.log.is_damaged:
         sys.stderr.write(f"{autopilot_log} is damaged in places; what could be read of it was imported.\n")
+    if alignment.unexplained_shift_m > _FAR_M:
+        sys.stderr.write(
+            f"{autopilot_log} has its positions {alignment.unexplained_shift_m:.1f} m away from ours on average, and they "
+            "were left there; did the autopilot set its origin anew?\n"
+        )
     _print(entry, alignment.log, len(logs))
     typer.echo(f"log        {out}")
 

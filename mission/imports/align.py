@@ -10,20 +10,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from mission.imports.errors import NoMatchError
+from mission.imports.motion import GRID_S, Flags, Floats, Grid, Motion, Pair, moving_s
 
-Floats = NDArray[np.float64]
-Flags = NDArray[np.bool_]
-
-GRID_S = 0.05
-"""Both motions are compared at this period."""
-MAX_GAP_S = 0.5
-"""Across a longer gap between samples nothing is interpolated."""
 MIN_OVERLAP_S = 20.0
 """Less than this in common tells nothing."""
 MIN_MOVING_S = 5.0
 """The vehicle has to have moved for this long within the overlap."""
 MIN_CORRELATION = 0.99
-"""One flight's two logs reach 0.9998; two flights of one mission 0.989 (34 recordings of PX4, each with each)."""
+"""One flight's two logs reach 0.9998; others 0.986 in 34 recordings of PX4, each with each, and 0.989 in simulation."""
 MAX_POSITION_RMS_M, MAX_POSITION_RMS_S = 0.15, 0.05
 """So far may positions differ, and by so much of a second's flight more: one flight's do by 0.01 m, others by 0.3 m."""
 MAX_LAG_S = 1.0
@@ -31,25 +25,9 @@ MAX_LAG_S = 1.0
 MIN_DRIFT_OVERLAP_S = 60.0
 """A drift is looked for from this length on."""
 
-_MOVING_M_S = 0.3
-_YAW_LEVER_M = 1.0  # how much a turn counts beside a movement [m/s for each rad/s]
-_MAX_YAW_RATE_RAD_S = 3.0  # more is the estimator's heading being reset
 _MAX_DRIFT_ERROR_S = 0.005  # at the overlap's ends; a drift known less well is worse than none
 _N_REFINEMENTS = 6
 _RIVAL_S = 5.0  # another peak farther away than this is another answer
-
-
-@dataclass(frozen=True, slots=True)
-class Motion:
-    """A vehicle's motion as one log has it, in that log's clock.
-
-    `t_s` (n,) float64 [s], rising; `position_m` and `velocity_m_s` (n, 3) float64 NED; `yaw_rad` (n,) float64.
-    """
-
-    t_s: Floats
-    position_m: Floats
-    velocity_m_s: Floats
-    yaw_rad: Floats
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,6 +84,11 @@ def check_motion(ours: Motion, theirs: Motion, clock: ClockMap) -> tuple[float, 
 
     Raises NoMatchError when the motions do not agree within MAX_LAG_S of it, or hold too little to tell.
     """
+    if _pair(ours, theirs, clock).t_s.size * GRID_S < MIN_OVERLAP_S:
+        raise NoMatchError(
+            f"by the autopilot's clock they have less than {MIN_OVERLAP_S:.0f} s of motion in common; its log is of "
+            "another flight"
+        )
     lags_s = np.arange(-MAX_LAG_S, MAX_LAG_S + GRID_S / 2, GRID_S)
     correlations = [_fit(ours, theirs, clock.later(lag_s), None).correlation for lag_s in lags_s.tolist()]
     lagged = clock.later(float(lags_s[int(np.argmax(correlations))]))
@@ -116,6 +99,10 @@ def check_motion(ours: Motion, theirs: Motion, clock: ClockMap) -> tuple[float, 
     if abs(lag_s) > MAX_LAG_S:
         raise NoMatchError(f"the boot clock and the motion disagree by {lag_s:+.1f} s; they are of different flights")
     return lag_s, fit
+
+
+def _pair(ours: Motion, theirs: Motion, clock: ClockMap) -> Pair:
+    return Pair.of(ours, replace(theirs, t_s=clock.ours_s(theirs.t_s)))
 
 
 def _require_one_flight(fit: Fit) -> None:
@@ -134,7 +121,7 @@ def _require_one_flight(fit: Fit) -> None:
 
 def _coarse(ours: Motion, theirs: Motion) -> ClockMap:
     """The offset at which the motions correlate best, to a fraction of GRID_S."""
-    a, b = _Grid.of(ours), _Grid.of(theirs)
+    a, b = Grid.of(ours), Grid.of(theirs)
     for grid, whose in ((a, "our log"), (b, "the autopilot's log")):
         known_s = grid.is_known.sum() * GRID_S
         if known_s < MIN_OVERLAP_S:
@@ -199,10 +186,10 @@ def _refine(ours: Motion, theirs: Motion, clock: ClockMap, *, with_drift: bool =
     Drift is estimated when the common flight is long enough and it comes out well determined.
     """
     for _ in range(_N_REFINEMENTS):
-        pair = _Pair.of(ours, theirs, clock)
+        pair = _pair(ours, theirs, clock)
         if pair.t_s.size * GRID_S < MIN_OVERLAP_S:
             raise NoMatchError(f"they have less than {MIN_OVERLAP_S:.0f} s of motion in common")
-        if min(pair.moving_s(pair.ours_velocity_m_s), pair.moving_s(pair.theirs_velocity_m_s)) < MIN_MOVING_S:
+        if min(moving_s(pair.ours_velocity_m_s), moving_s(pair.theirs_velocity_m_s)) < MIN_MOVING_S:
             raise NoMatchError(
                 "the vehicle hardly moves while both logs run, so nothing tells that they belong together"
             )
@@ -221,7 +208,7 @@ def _refine(ours: Motion, theirs: Motion, clock: ClockMap, *, with_drift: bool =
     return clock, shift_m
 
 
-def _least_squares(pair: "_Pair", middle_s: float | None) -> tuple[float, float, float, Floats]:
+def _least_squares(pair: Pair, middle_s: float | None) -> tuple[float, float, float, Floats]:
     """How late their clock has to be read [s], its drift (0 without `middle_s`) and that one's error, and the shift."""
     error_m = pair.ours_position_m - pair.theirs_position_m
     size_m = np.linalg.norm(error_m - np.median(error_m, axis=0), axis=1)
@@ -243,7 +230,7 @@ def _least_squares(pair: "_Pair", middle_s: float | None) -> tuple[float, float,
 
 
 def _fit(ours: Motion, theirs: Motion, clock: ClockMap, shift_m: Floats | None) -> Fit:
-    pair = _Pair.of(ours, theirs, clock)
+    pair = _pair(ours, theirs, clock)
     shift = np.zeros(3) if shift_m is None else shift_m
     if not pair.t_s.size:
         return Fit(0.0, 0.0, 0.0, 0.0, 0.0, shift)
@@ -258,73 +245,3 @@ def _fit(ours: Motion, theirs: Motion, clock: ClockMap, shift_m: Floats | None) 
         position_rms_m=float(np.sqrt((position_m**2).sum(axis=1).mean())),
         shift_m=shift,
     )
-
-
-@dataclass(frozen=True, slots=True)
-class _Pair:
-    """Both motions at the same moments `t_s` (n,) of our clock, where both are known."""
-
-    t_s: Floats
-    ours_position_m: Floats
-    theirs_position_m: Floats
-    ours_velocity_m_s: Floats
-    theirs_velocity_m_s: Floats
-    ours_signal: Floats
-    theirs_signal: Floats
-
-    @staticmethod
-    def of(ours: Motion, theirs: Motion, clock: ClockMap) -> "_Pair":
-        mapped = replace(theirs, t_s=clock.ours_s(theirs.t_s))
-        start_s, end_s = max(ours.t_s[0], mapped.t_s[0]), min(ours.t_s[-1], mapped.t_s[-1])
-        t_s = np.arange(start_s, end_s, GRID_S) if end_s > start_s else np.empty(0)
-        is_known = _is_known(ours.t_s, t_s) & _is_known(mapped.t_s, t_s)
-        return _Pair(
-            t_s[is_known],
-            *(_at(motion.t_s, motion.position_m, t_s)[is_known] for motion in (ours, mapped)),
-            *(_at(motion.t_s, motion.velocity_m_s, t_s)[is_known] for motion in (ours, mapped)),
-            *(_signal(motion, t_s)[is_known] for motion in (ours, mapped)),
-        )
-
-    def moving_s(self, velocity_m_s: Floats) -> float:
-        """For how long a velocity (n, 3) shows movement."""
-        return float((np.linalg.norm(velocity_m_s, axis=1) > _MOVING_M_S).sum() * GRID_S)
-
-
-@dataclass(frozen=True, slots=True)
-class _Grid:
-    """A motion on an even grid from `start_s` on; `signal` (n, 4) is 0 where it is not known."""
-
-    start_s: float
-    signal: Floats
-    is_known: Flags
-    is_moving: Flags
-
-    @staticmethod
-    def of(motion: Motion) -> "_Grid":
-        t_s = np.arange(motion.t_s[0], motion.t_s[-1], GRID_S)
-        is_known = _is_known(motion.t_s, t_s)
-        signal = np.where(is_known[:, None], _signal(motion, t_s), 0.0)
-        is_moving = is_known & (np.linalg.norm(signal[:, :3], axis=1) > _MOVING_M_S)
-        return _Grid(float(motion.t_s[0]), signal, is_known, is_moving)
-
-
-def _signal(motion: Motion, t_s: Floats) -> Floats:
-    """What is compared, (n, 4): the velocity [m/s] and the yaw rate on a lever [m/s]."""
-    velocity_m_s = _at(motion.t_s, motion.velocity_m_s, t_s)
-    if t_s.size < 2:
-        return np.hstack([velocity_m_s, np.zeros((t_s.size, 1))])
-    yaw_rate_rad_s = np.gradient(np.interp(t_s, motion.t_s, np.unwrap(motion.yaw_rad)), GRID_S)
-    turn_m_s = np.clip(yaw_rate_rad_s, -_MAX_YAW_RATE_RAD_S, _MAX_YAW_RATE_RAD_S) * _YAW_LEVER_M
-    return np.hstack([velocity_m_s, turn_m_s[:, None]])
-
-
-def _at(source_s: Floats, values: Floats, t_s: Floats) -> Floats:
-    """`values` (n, 3) at `source_s` (n,), interpolated at `t_s` (m,)."""
-    return np.stack([np.interp(t_s, source_s, column) for column in values.T], axis=1)
-
-
-def _is_known(source_s: Floats, t_s: Floats) -> Flags:
-    """Whether each of `t_s` lies between two samples that are near each other."""
-    after = np.clip(np.searchsorted(source_s, t_s, side="right"), 1, len(source_s) - 1)
-    inside = (t_s >= source_s[0]) & (t_s <= source_s[-1])
-    return np.asarray(inside & (source_s[after] - source_s[after - 1] <= MAX_GAP_S))

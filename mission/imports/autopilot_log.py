@@ -8,7 +8,7 @@ import numpy as np
 
 from drivers.clock import NS_PER_S
 from mission.autopilot import VehicleState
-from mission.imports.align import Motion
+from mission.imports.motion import Motion
 from mission.log.channels import CHANNEL_OF, RateLimit
 from mission.log.imported import (
     ImportedActuators,
@@ -20,7 +20,7 @@ from mission.log.imported import (
     ImportedText,
 )
 
-_MAX_UPTIME_NS = 100 * 86_400 * NS_PER_S  # a time beyond this is a damaged one, and would outrun all that follow
+_MAX_UPTIME_NS = 4 * 86_400 * NS_PER_S  # a time beyond this is a damaged one, and would outrun all that follow
 _MAX_DISTANCE_M, _MAX_SPEED_M_S = 1e6, 1e3
 
 Tell = Callable[[float], None]

@@ -1,12 +1,14 @@
 """Lay an autopilot's own log beside ours: align the clocks, check the motion, and write both to a new log."""
 
+import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-from mission.imports.align import ClockMap, Fit, Motion, check_motion, match_motion
+from mission.imports.align import ClockMap, Fit, check_motion, match_motion
 from mission.imports.autopilot_log import AutopilotLog, motion_of
 from mission.imports.boot_clock import BootClock, boot_clock
 from mission.imports.errors import NoMatchError
+from mission.imports.motion import Motion
 from mission.log.imported import ImportedLog, ImportedRecord, ImportedSetpoint, ImportedState
 from mission.log.reader import Flight
 
@@ -31,6 +33,11 @@ class Alignment:
             return _NO_SHIFT
         north_m, east_m, down_m = self.fit.shift_m.tolist()
         return north_m, east_m, down_m
+
+    @property
+    def unexplained_shift_m(self) -> float:
+        """How far its positions lie from ours on average [m], when they ought to have our origin."""
+        return 0.0 if self.log.has_own_origin else math.hypot(*self.fit.shift_m.tolist())
 
 
 def align_best(flight: Flight, logs: list[AutopilotLog]) -> Alignment:

@@ -5,8 +5,9 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from mission.imports.align import ClockMap, Motion, check_motion, match_motion
+from mission.imports.align import ClockMap, check_motion, match_motion
 from mission.imports.errors import NoMatchError
+from mission.imports.motion import Motion
 
 NOISE_M, NOISE_M_S, NOISE_RAD = 0.03, 0.03, 0.005
 
