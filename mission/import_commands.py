@@ -57,8 +57,8 @@ def import_log(
         sys.stderr.write(f"{autopilot_log} is damaged in places; what could be read of it was imported.\n")
     if alignment.unexplained_shift_m > _FAR_M:
         sys.stderr.write(
-            f"{autopilot_log} has its positions {alignment.unexplained_shift_m:.1f} m away from ours on average, and they "
-            "were left there; did the autopilot set its origin anew?\n"
+            f"{autopilot_log} has its positions {alignment.unexplained_shift_m:.1f} m away from ours on average, and "
+            "they were left there; did the autopilot set its origin anew?\n"
         )
     _print(entry, alignment.log, len(logs))
     typer.echo(f"log        {out}")

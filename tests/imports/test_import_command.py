@@ -185,6 +185,17 @@ def test_a_place_that_cannot_be_written_is_exit_1(ours: Path, theirs: Path, tmp_
     assert "Traceback" not in ran.err
 
 
+def test_positions_of_another_origin_are_said_and_left(flown: Flown, ours: Path, tmp_path: Path) -> None:
+    log, out = tmp_path / "moved.ulg", tmp_path / "both.mcap"
+    write_ulog(log, replace(flown, estimates=[replace(state, north_m=state.north_m + 3) for state in flown.estimates]))
+    ran = lineflight("import", ours, log, "--out", out)
+    assert ran.code == 0
+    assert "3.0 m away from ours" in ran.err
+    imported = read_flight(out).imported
+    assert imported is not None
+    assert imported.log.shift_ned_m == (0.0, 0.0, 0.0)
+
+
 @pytest.mark.parametrize("with_clock", [True, False])
 def test_another_flight_of_the_same_mission_is_refused(flown: Flown, tmp_path: Path, with_clock: bool) -> None:
     """The same commands at the same times after boot, in other gusts."""
