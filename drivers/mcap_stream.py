@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING, BinaryIO, cast
 
 from mcap.exceptions import EndOfFile
-from mcap.records import Attachment, Channel, Message
+from mcap.records import Attachment, Channel, McapRecord, Message
 from mcap.stream_reader import StreamReader
 
 if TYPE_CHECKING:
@@ -47,26 +47,40 @@ def whole_records(file: BinaryIO) -> tuple[int, bool]:
 def messages(stream: BinaryIO, attachments: dict[str, bytes] | None = None) -> Iterator[tuple[str, int, bytes]]:
     """Topic, log time [ns, Unix] and body of each message, in the order written; fills `attachments` by name."""
     topics: dict[int, str] = {}
+    for record in _records(stream):
+        if isinstance(record, Channel):
+            topics[record.id] = record.topic
+        elif isinstance(record, Message):
+            yield topics[record.channel_id], record.log_time, record.data
+        elif isinstance(record, Attachment) and attachments is not None:
+            attachments[record.name] = record.data
+
+
+def open_messages(file: BinaryIO, attachments: dict[str, bytes] | None = None) -> Iterator[tuple[str, int, bytes]]:
+    """The messages of an open MCAP file as far as it is whole. Raises ValueError for another kind of file."""
+    return messages(_whole(file), attachments)
+
+
+def open_records(file: BinaryIO) -> Iterator[McapRecord]:
+    """Every record of an open MCAP file as far as it is whole, chunks unpacked. Raises ValueError for another kind."""
+    return _records(_whole(file))
+
+
+def _records(stream: BinaryIO) -> Iterator[McapRecord]:
     try:
-        for record in StreamReader(stream, validate_crcs=True, record_size_limit=None).records:
-            if isinstance(record, Channel):
-                topics[record.id] = record.topic
-            elif isinstance(record, Message):
-                yield topics[record.channel_id], record.log_time, record.data
-            elif isinstance(record, Attachment) and attachments is not None:
-                attachments[record.name] = record.data
+        yield from StreamReader(stream, validate_crcs=True, record_size_limit=None).records
     except EndOfFile:
         # The stream holds whole records only: this is the end of a log that was never closed.
         return
 
 
-def open_messages(file: BinaryIO, attachments: dict[str, bytes] | None = None) -> Iterator[tuple[str, int, bytes]]:
-    """The messages of an open MCAP file as far as it is whole. Raises ValueError for another kind of file."""
+def _whole(file: BinaryIO) -> BinaryIO:
+    """The part of an open MCAP file that holds whole records, from its beginning."""
     if file.read(len(MAGIC)) != MAGIC:
         raise ValueError("not an MCAP file")
     whole_bytes, _ = whole_records(file)
     file.seek(0)
-    return messages(cast("BinaryIO", _Head(file, whole_bytes)), attachments)
+    return cast("BinaryIO", _Head(file, whole_bytes))
 
 
 class _Head(io.RawIOBase):

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from mission import fly_commands, inspect_commands
+from mission import fly_commands, import_commands, inspect_commands
 from mission.camera_commands import app as camera_app
 from mission.ending import EXIT_BAD_INPUT, EXIT_FAILED_FILE, EXIT_FAULT, fail, read_mission
 from mission.export_commands import app as export_app
@@ -37,6 +37,7 @@ app.command()(fly_commands.run)
 app.command()(fly_commands.resume)
 app.command()(fly_commands.sitl)
 app.command()(inspect_commands.inspect)
+app.command("import")(import_commands.import_log)
 
 
 def main() -> None:

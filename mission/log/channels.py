@@ -9,6 +9,15 @@ from pydantic import TypeAdapter
 from drivers.clock import NS_PER_S
 from drivers.mcap_stream import IMAGE_TOPIC
 from mission.autopilot import VehicleState
+from mission.log.imported import (
+    ImportedActuators,
+    ImportedLog,
+    ImportedMode,
+    ImportedPower,
+    ImportedSetpoint,
+    ImportedState,
+    ImportedText,
+)
 from mission.log.records import LoggedMission, LogHealth, SentSetpoint, StatusText, VisionEntry
 from mission.records import (
     AutopilotTarget,
@@ -87,6 +96,14 @@ RECORD_CHANNELS = (
     RecordChannel("/log/health", LogHealth, "how the log itself does", "1 Hz"),
     RecordChannel("/truth/pose", TruePose, "where a simulated vehicle truly was", "at most 20 Hz", 20.0),
     RecordChannel("/truth/line", TrueLine, "the simulated power line", "once"),
+    # Nothing writes these in flight: `lineflight import` adds them to a copy of the log.
+    RecordChannel("/imported/log", ImportedLog, "the autopilot's own log, and how its clock was aligned", "once"),
+    RecordChannel("/imported/state", ImportedState, "the vehicle as the autopilot logged it", "at most 20 Hz", 20.0),
+    RecordChannel("/imported/setpoint", ImportedSetpoint, "what its position control flew to", "at most 20 Hz", 20.0),
+    RecordChannel("/imported/actuators", ImportedActuators, "what the motors were told", "at most 10 Hz", 10.0),
+    RecordChannel("/imported/power", ImportedPower, "the battery as the autopilot measured it", "at most 2 Hz", 2.0),
+    RecordChannel("/imported/text", ImportedText, "the messages that the autopilot logged", "on change"),
+    RecordChannel("/imported/mode", ImportedMode, "the flight mode by the autopilot's own name", "on change"),
 )
 
 IMAGE = FoxgloveChannel(

@@ -16,6 +16,16 @@ from drivers.mcap_stream import IMAGE_DATA_FIELD, IMAGE_TOPIC, MAGIC, bytes_fiel
 from mission.autopilot import VehicleState
 from mission.log import channels
 from mission.log.errors import LogError
+from mission.log.imported import (
+    Imported,
+    ImportedActuators,
+    ImportedLog,
+    ImportedMode,
+    ImportedPower,
+    ImportedSetpoint,
+    ImportedState,
+    ImportedText,
+)
 from mission.log.records import LoggedMission, LogHealth, SentSetpoint, StatusText, VisionEntry
 from mission.records import (
     AutopilotTarget,
@@ -33,13 +43,16 @@ from mission.records import (
 )
 from vision.records import VisionReport
 
+_IMPORTED = (ImportedState, ImportedSetpoint, ImportedActuators, ImportedPower, ImportedText, ImportedMode)
+
 
 @dataclass(frozen=True, slots=True)
 class Flight:
     """All that a log holds, each stream in the order of its times; flight time [ns] throughout.
 
     `is_truncated` says that the log was never closed: the program or the computer died. `reports` carry their JPEGs
-    only when the flight was read with images; `image_times_ns` tells of which frames the log has one.
+    only when the flight was read with images; `image_times_ns` tells of which frames the log has one. `imported` is the
+    autopilot's own log, where `lineflight import` has laid it beside ours; `end_ns` does not count it.
     """
 
     path: Path
@@ -63,6 +76,7 @@ class Flight:
     health: tuple[LogHealth, ...]
     attachments: dict[str, bytes]
     image_times_ns: frozenset[int]
+    imported: Imported | None
     end_ns: int
     is_truncated: bool
 
@@ -174,7 +188,12 @@ def _flight(
         records.sort(key=lambda record: getattr(record, "t_ns", 0))
     mission: LoggedMission = streams[LoggedMission][0]
     offset_ns = mission.unix_minus_flight_ns
-    times_ns = [records[-1].t_ns for records in streams.values() if records and hasattr(records[-1], "t_ns")]
+    imported = _imported(streams)
+    times_ns = [
+        records[-1].t_ns
+        for kind, records in streams.items()
+        if records and hasattr(records[-1], "t_ns") and kind not in _IMPORTED
+    ]
     ended, lines, origins = streams[MissionEnded], streams[TrueLine], streams[Origin]
     return Flight(
         path=path,
@@ -198,9 +217,16 @@ def _flight(
         health=tuple(streams[LogHealth]),
         attachments=attachments,
         image_times_ns=frozenset(entry.t_ns for entry in streams[VisionEntry] if entry.has_image),
+        imported=imported,
         end_ns=max([mission.start_ns, *times_ns]),
-        is_truncated=is_truncated,
+        is_truncated=is_truncated or (imported is not None and imported.log.was_cut_off),
     )
+
+
+def _imported(streams: dict[type, list[Any]]) -> Imported | None:
+    if not streams[ImportedLog]:
+        return None
+    return Imported(streams[ImportedLog][-1], *(tuple(streams[kind]) for kind in _IMPORTED))
 
 
 def _report(entry: VisionEntry, jpeg: bytes | None) -> VisionReport:

@@ -22,6 +22,15 @@ from mission.log import channels
 from mission.log.backlog import Backlog
 from mission.log.disk import log_path
 from mission.log.errors import LogError
+from mission.log.imported import (
+    ImportedActuators,
+    ImportedLog,
+    ImportedMode,
+    ImportedPower,
+    ImportedSetpoint,
+    ImportedState,
+    ImportedText,
+)
 from mission.log.reader import Flight, read_flight
 from mission.log.recorder import Recorder
 from mission.log.records import LogHealth, SentSetpoint, StatusText
@@ -129,7 +138,8 @@ def test_the_log_holds_the_channels_of_the_table_with_their_schemas(log: Path) -
         summary = make_reader(file).get_summary()
     assert summary is not None
     found = {channel.topic: summary.schemas[channel.schema_id] for channel in summary.channels.values()}
-    unused = {"/status_text", "/preflight/check", "/log/health"}
+    imported = {channel.topic for channel in channels.RECORD_CHANNELS if channel.topic.startswith("/imported/")}
+    unused = {"/status_text", "/preflight/check", "/log/health", *imported}
     for channel in channels.RECORD_CHANNELS:
         if channel.topic not in unused:
             assert found[channel.topic].encoding == "jsonschema"
@@ -159,6 +169,13 @@ st.register_type_strategy(float, st.floats(allow_nan=False, allow_infinity=False
     | st.builds(ControlTick)
     | st.builds(Origin)
     | st.builds(LogHealth)
+    | st.builds(ImportedLog)
+    | st.builds(ImportedState)
+    | st.builds(ImportedSetpoint)
+    | st.builds(ImportedActuators)
+    | st.builds(ImportedPower)
+    | st.builds(ImportedText)
+    | st.builds(ImportedMode)
 )
 def test_any_record_survives_json(record: object) -> None:
     topic = channels.CHANNEL_OF[type(record)].topic

@@ -10,7 +10,7 @@ import pytest
 from tests.support.command_line import ROOT, Ran, lineflight
 
 MISSION = ROOT / "missions" / "follow_line.yaml"
-COMMANDS = ("dry-run", "run", "sitl", "check", "detect", "camera", "inspect", "export", "compare", "replay")
+COMMANDS = ("dry-run", "run", "sitl", "check", "detect", "camera", "inspect", "export", "import", "compare", "replay")
 BAD_MISSIONS = {
     "wrong unit": (b"version: 1\nname: x\ntasks:\n  - {task: takeoff, altitude_ft: 5}\n  - {task: land}\n", ":4: "),
     "unknown task": (b"version: 1\nname: x\ntasks:\n  - {task: takeoff}\n  - {task: loop}\n", ":5: tasks[1].task"),

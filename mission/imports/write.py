@@ -1,0 +1,113 @@
+"""Copy a flight log whole, and lay further records into it: a new MCAP file."""
+
+import json
+import os
+from collections.abc import Callable, Iterable, Iterator
+from pathlib import Path
+
+from mcap.records import Attachment, Channel, Header, McapRecord, Message, Metadata, Schema
+from mcap.writer import Writer
+
+from drivers.mcap_stream import open_records
+from mission.log import channels
+from mission.log.errors import LogError
+
+_TELL_PERIOD = 1_000  # records
+
+
+class CopyError(Exception):
+    """The new log cannot be written; the message is one sentence for a person."""
+
+
+def write_copy(source: Path, out: Path, records: Iterable[tuple[int, object]], tell: Callable[[float], None]) -> None:
+    """Write `out`: every schema, channel, message, attachment and metadata of the log `source`, and `records` between.
+
+    `records` are records of mission.log.channels with their log times [ns, Unix], in the order of these. `tell` hears
+    how much of `source` has been read, 0 to 1. What stands under `out` is whole: it is written under another name
+    first.
+    Raises CopyError when it exists or cannot be written, LogError when `source` cannot be read.
+    """
+    if out.exists():
+        raise CopyError(f"{out} exists already; name another file by --out, or remove it.")
+    part = out.with_name(out.name + ".part")
+    try:
+        with part.open("xb") as file:
+            try:
+                _copy(_records(source, tell), Writer(file), iter(records))
+                file.flush()
+                os.fsync(file.fileno())
+                part.rename(out)
+            finally:
+                part.unlink(missing_ok=True)  # it has been renamed, or is not whole
+    except FileExistsError as error:
+        raise CopyError(f"{part} is in the way, which an import left or still writes; remove it first.") from error
+    except OSError as error:
+        raise CopyError(
+            f"The log {out} cannot be written ({error.strerror or error}); name a place with room by --out."
+        ) from error
+
+
+def _records(source: Path, tell: Callable[[float], None]) -> Iterator[McapRecord]:
+    """Every record of a log; raises LogError."""
+    try:
+        with source.open("rb") as file:
+            n_bytes = max(source.stat().st_size, 1)
+            for index, record in enumerate(open_records(file)):
+                if index % _TELL_PERIOD == 0:
+                    tell(file.tell() / n_bytes)
+                yield record
+    except OSError as error:
+        raise LogError(f"The log {source} cannot be read ({error.strerror}); is its disk still there?") from error
+
+
+def _copy(originals: Iterator[McapRecord], writer: Writer, records: Iterator[tuple[int, object]]) -> None:
+    schema_ids = {0: 0}  # 0: a channel without a schema
+    channel_ids: dict[int, int] = {}
+    added = _Added(writer)
+    waiting = next(records, None)
+    for record in originals:
+        # A closed log repeats its schemas and channels at its end.
+        if isinstance(record, Header):
+            writer.start(record.profile, record.library)
+        elif isinstance(record, Schema) and record.id not in schema_ids:
+            schema_ids[record.id] = writer.register_schema(record.name, record.encoding, record.data)
+        elif isinstance(record, Channel) and record.id not in channel_ids:
+            channel_ids[record.id] = writer.register_channel(
+                record.topic, record.message_encoding, schema_ids[record.schema_id], record.metadata
+            )
+        elif isinstance(record, Attachment):
+            writer.add_attachment(record.create_time, record.log_time, record.name, record.media_type, record.data)
+        elif isinstance(record, Metadata):
+            writer.add_metadata(record.name, record.metadata)
+        elif isinstance(record, Message):
+            while waiting is not None and waiting[0] <= record.log_time:
+                added.write(*waiting)
+                waiting = next(records, None)
+            writer.add_message(
+                channel_ids[record.channel_id], record.log_time, record.data, record.publish_time, record.sequence
+            )
+    while waiting is not None:
+        added.write(*waiting)
+        waiting = next(records, None)
+    writer.finish()
+
+
+class _Added:
+    """Writes records of mission.log.channels; makes each one's channel when its first record comes."""
+
+    def __init__(self, writer: Writer) -> None:
+        self._writer = writer
+        self._channel_ids: dict[type, int] = {}
+
+    def write(self, log_time_ns: int, record: object) -> None:
+        kind = type(record)
+        if kind not in self._channel_ids:
+            self._channel_ids[kind] = self._register(kind)
+        self._writer.add_message(self._channel_ids[kind], log_time_ns, channels.encode(record), log_time_ns)
+
+    def _register(self, kind: type) -> int:
+        channel = channels.CHANNEL_OF[kind]
+        schema = json.dumps(channels.json_schema(kind)).encode()
+        schema_id = self._writer.register_schema(f"lineflight.{kind.__name__}", "jsonschema", schema)
+        about = {"what": channel.what, "rate": channel.rate}
+        return int(self._writer.register_channel(channel.topic, "json", schema_id, about))
