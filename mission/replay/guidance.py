@@ -79,10 +79,10 @@ class _Fixes:
 def replay_guidance(
     flight: Flight, plan: MissionPlan, camera: Intrinsics, reports: Sequence[VisionReport]
 ) -> Iterator[ReplayedTick]:
-    """At each tick that sent a setpoint, what today's task would have sent: from the flight's setpoint before it, the
-    flight's state, and `reports`, in the order in which they were told.
+    """What today's task would have sent at each tick that sent a setpoint.
 
-    Since each tick starts from where the flight was, a difference does not grow from tick to tick. Tasks that the
+    It starts from the flight's setpoint before the tick and its state then, and sees `reports`, in the order in which
+    they were told. Since each tick starts from where the flight was, a difference does not grow from tick to tick. Tasks that the
     flight did not reach are not flown, searches and pauses are passed over. `plan` is what was flown.
     """
     if not flight.states or not flight.ticks:
