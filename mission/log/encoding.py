@@ -64,7 +64,8 @@ _LOG_LEVEL = {
 class Encoder:
     """The channels of one flight.
 
-    Each record goes to its own JSON channel, and where a viewer can show it, to Foxglove's own. Every sink of `context` hears them. `newest_ns` is the newest time [ns, flight] of any record.
+    Each record goes to its own JSON channel, and where a viewer can show it, to Foxglove's own. Every sink of `context`
+    hears them. `newest_ns` is the newest time [ns, flight] of any record.
     """
 
     def __init__(self, context: foxglove.Context, mission: LoggedMission) -> None:
