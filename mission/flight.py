@@ -156,7 +156,7 @@ async def fly(
             if setup.feed_pose is not None:
                 sides.append(asyncio.create_task(_feed(setup.feed_pose, autopilot)))
             if live is not None:
-                sides.append(asyncio.create_task(_be_watched(live, executive, log, clock)))
+                sides.append(asyncio.create_task(be_watched(live, executive, log, clock)))
             try:
                 ended = await executive.run()
             finally:
@@ -227,7 +227,7 @@ async def _record_truth(true_pose: Callable[[], TruePose | None], log: FlightLog
     await _every(_TRUTH_RATE_HZ, clock.speed, act)
 
 
-async def _be_watched(live: LiveFeed, executive: Executive, log: FlightLog, clock: ScaledClock) -> None:
+async def be_watched(live: LiveFeed, executive: Executive, log: FlightLog, clock: ScaledClock) -> None:
     """Show the progress, and pass the operator's wishes on; a live view that has died is told once."""
     is_told = False
 
