@@ -21,6 +21,7 @@ WORDS = {Wish.HOLD: b"h", Wish.LAND: b"l"}
 """What goes back to the flight: one byte for each wish. Nothing that a network could reach is ever unpickled there."""
 
 _LAST_WORD_S = 1.5  # a page that asks three times a second has seen the end by then
+_WELCOME_PERIOD_S = 0.2
 _NICENESS = 10  # vision and control go first
 
 
@@ -33,7 +34,9 @@ def serve(settings: LiveSettings, records: Connection, wishes: Connection) -> No
     try:
         web = LiveServer(settings, board, lock, lambda wish: _pass_on(wishes, wish))
     except OSError as error:
-        wishes.send(Serving(0, 0, _cannot("page", settings.address, settings.port, "--live-port", error)))
+        wishes.send(
+            Serving(0, 0, _cannot("page", settings.address, settings.port, "--live-port or --live-address", error))
+        )
         return
     stream_address = "127.0.0.1"
     try:
@@ -47,7 +50,9 @@ def serve(settings: LiveSettings, records: Connection, wishes: Connection) -> No
     threading.Thread(target=web.serve_forever, name="page", daemon=True).start()
     with contextlib.suppress(EOFError, OSError):
         while True:
-            _take(records, board, lock, stream)
+            if records.poll(_WELCOME_PERIOD_S):
+                _take(records, board, lock, stream)
+            stream.welcome()
     time.sleep(_LAST_WORD_S)
     stream.close()
 
@@ -62,7 +67,6 @@ def _take(records: Connection, board: Board, lock: threading.Lock, stream: LiveS
         # A record that a viewer's channel cannot take is missing there; the log says what is wrong with it.
         with contextlib.suppress(KeyError, ValueError, TypeError):
             stream.write(record)
-    stream.welcome()
 
 
 def _pass_on(wishes: Connection, wish: Wish) -> bool:
@@ -75,4 +79,4 @@ def _pass_on(wishes: Connection, wish: Wish) -> bool:
 
 def _cannot(what: str, address: str, port: int, option: str, error: OSError) -> str:
     reason = error.strerror or str(error)
-    return f"The live view's {what} cannot be served at {address}:{port} ({reason}); choose another port with {option}."
+    return f"The live view's {what} cannot be served at {address}:{port} ({reason}); choose another with {option}."

@@ -325,6 +325,7 @@ class LiveStream:
     def __init__(self, address: str, port: int) -> None:
         self._context = foxglove.Context()
         self._newcomers: queue.SimpleQueue[str] = queue.SimpleQueue()
+        foxglove.set_log_level("CRITICAL")  # a viewer that goes without a word is nobody's business
         try:
             self._server = foxglove.start_server(
                 name="lineflight",

@@ -90,13 +90,13 @@ class FoxgloveClient:
         body = json.dumps(message).encode()
         self._socket.sendall(struct.pack(">BBH4x", 0x81, 0x80 | 126, len(body)) + body)
 
-    def channels(self) -> dict[str, int]:
-        """Topics and channel ids, as advertised in the next messages."""
+    def channels(self, topics: set[str]) -> dict[str, int]:
+        """Topics and channel ids, as advertised in the next messages; waits until all `topics` are among them."""
         found: dict[str, int] = {}
-        while not found:
+        while not topics <= set(found):
             heard = json.loads(self.hear())
             if heard["op"] == "advertise":
-                found = {channel["topic"]: channel["id"] for channel in heard["channels"]}
+                found |= {channel["topic"]: channel["id"] for channel in heard["channels"]}
         return found
 
     def close(self) -> None:

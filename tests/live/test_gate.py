@@ -8,7 +8,7 @@ import pytest
 from mission.live.gate import refusal
 from mission.live.settings import LiveSettings
 
-TOKEN = "the token"
+TOKEN = "the token"  # noqa: S105  # of nothing
 HERE = LiveSettings(token=TOKEN)
 FAR = LiveSettings(address="192.168.7.2", token=TOKEN)
 HOST = "127.0.0.1:8080"
@@ -94,8 +94,8 @@ def test_on_this_computer_reading_needs_no_token_and_elsewhere_only_the_empty_pa
 
 @pytest.mark.parametrize(
     ("address", "is_local"),
-    [("127.0.0.1", True), ("127.3.2.1", True), ("::1", True), ("localhost", True), (str(IPv4Address(0)), False), ("::", False),
-     ("192.168.7.2", False), ("drone.local", False)],
+    [("127.0.0.1", True), ("127.3.2.1", True), ("::1", True), ("localhost", True), (str(IPv4Address(0)), False),
+     ("::", False), ("192.168.7.2", False), ("drone.local", False)],
 )  # fmt: skip
 def test_what_is_local(address: str, is_local: bool) -> None:
     assert LiveSettings(address=address).is_local is is_local

@@ -1,5 +1,6 @@
 """The live view's process, fed as by a flight: it shows, it passes wishes on, and it never holds the flight up."""
 
+import contextlib
 import os
 import signal
 import socket
@@ -129,13 +130,12 @@ def test_a_port_that_is_taken_is_said_before_anything_flies(option: str, words: 
 
 def test_foxglove_has_the_logs_channels_and_latecomers_hear_what_was_said_once(feed: LiveFeed) -> None:
     until(lambda: ask(feed.serving.port, "/state").json["frame"])
-    client = FoxgloveClient(feed.serving.foxglove_port)
-    channels = client.channels()
-    assert set(channels) == {channel.topic for channel in (*RECORD_CHANNELS, *FOXGLOVE_CHANNELS)}
-    client.say({"op": "subscribe", "subscriptions": [{"id": 1, "channelId": channels["/mission"]}]})
-    feed.record(StatusText(START_NS, "a batch"))  # newcomers are welcomed with the next one
-    heard = client.hear()
-    while not heard.startswith(b"\x01"):  # a message's data
+    with contextlib.closing(FoxgloveClient(feed.serving.foxglove_port)) as client:
+        topics = {channel.topic for channel in (*RECORD_CHANNELS, *FOXGLOVE_CHANNELS)}
+        channels = client.channels(topics)
+        assert set(channels) == topics
+        client.say({"op": "subscribe", "subscriptions": [{"id": 1, "channelId": channels["/mission"]}]})
         heard = client.hear()
-    assert b"follow_line" in heard
-    client.close()
+        while not heard.startswith(b"\x01"):  # a message's data
+            heard = client.hear()
+        assert b"follow_line" in heard
