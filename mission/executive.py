@@ -28,9 +28,20 @@ from mission.flow import Flow
 from mission.hazards import find_hazards
 from mission.helm import Helm, TakenOverError, UnsafeSetpointError
 from mission.logbook import Logbook
+from mission.operator import Wish
 from mission.plan import MissionPlan
 from mission.preflight import wait_until_ready
-from mission.records import Attachment, AutopilotTarget, ControlTick, MissionEnded, Origin, PreflightCheck, Result
+from mission.records import (
+    Attachment,
+    AutopilotTarget,
+    ControlTick,
+    Event,
+    MissionEnded,
+    Origin,
+    PreflightCheck,
+    Result,
+    Severity,
+)
 from mission.reporting import FlightLog, Progress
 from mission.resumption import CannotResumeError, Resumption, plan_to_reckon
 from mission.safety import PAUSES, Hazard, Reaction, decide, keep_going_down
@@ -56,7 +67,7 @@ class Crew:
 
 
 class Executive:
-    """Flies one mission; `run` once. `request_stop` may be called at any time from the event loop.
+    """Flies one mission; `run` once. `request_stop` and `request` may be called at any time from the event loop.
 
     With a `resumption` it takes an interrupted mission up again; `plan` then holds what is left of it.
     `on_checks` hears the pre-flight checks once, before arming.
@@ -106,6 +117,24 @@ class Executive:
         """Ask the flight to end now: before arming at once, in the air by the mission's reaction."""
         self._situation.is_interrupted = True
 
+    def request(self, wish: Wish) -> None:
+        """Pass on what the operator wishes: before arming the flight ends at once, in the air safety decides.
+
+        A wish that comes too late changes nothing, which is said in the log: the pilot has the vehicle, or it is on its
+        way down already.
+        """
+        words = None
+        if self._flow.machine.is_over:
+            words = (
+                f"the operator asked to {wish} after the flight had ended ({self._flow.machine.state}); nothing is sent"
+            )
+        elif self._flow.is_going_down:
+            words = f"the operator asked to {wish}; the mission has been ended already, and goes on with that"
+        if words is None:
+            self._situation.wish = wish
+        else:
+            self._log.record(Event(self._clock.now_ns(), f"operator_{wish}", Severity.WARNING, words))
+
     async def run(self) -> MissionEnded:
         """Fly the mission to its end, and say how it ended.
 
@@ -138,7 +167,7 @@ class Executive:
             self._clock,
             self._plan if self._resumption is None else plan_to_reckon(self._plan, self._resumption.index),
             lambda: self._crew.computer().free_disk_bytes,
-            lambda: self._situation.is_interrupted,
+            lambda: self._situation.is_asked_to_end,
             tell,
             may_fly=self._resumption is not None,
         )
@@ -149,7 +178,7 @@ class Executive:
             self._log.record(Attachment("parameters.json", "application/json", text.encode()))
         self._on_checks(ready.checks)
         state = self._autopilot.state
-        if self._situation.is_interrupted:
+        if self._situation.is_asked_to_end:
             await self._flow.machine.trigger_named("interrupt")
             return MissionEnded(self._clock.now_ns(), Result.INTERRUPTED, "stopped before arming")
         words = None

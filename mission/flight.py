@@ -21,14 +21,16 @@ from mission.checks import Check
 from mission.executive import Crew, Executive
 from mission.guard import Guard
 from mission.journal import SUFFIX, DiskJournal
+from mission.live.feed import LiveFeed, WatchedLog
+from mission.live.settings import Briefing
 from mission.log.disk import log_path
 from mission.log.errors import LogError
 from mission.log.recorder import Recorder
 from mission.logbook import FlightPapers, Logbook
 from mission.plan import MissionPlan
 from mission.plan_file import MissionFile
-from mission.records import MissionEnded, TrueLine, TruePose
-from mission.reporting import Progress
+from mission.records import Event, MissionEnded, Severity, TrueLine, TruePose
+from mission.reporting import FlightLog, Progress
 from mission.resumption import Resumption
 from mission.surroundings import Surroundings, Watched
 from mission.worker_eyes import WorkerEyes
@@ -40,6 +42,7 @@ STOP_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _PROGRESS_RATE_HZ = 5.0
 _TRUTH_RATE_HZ = 20.0
 _POSE_RATE_HZ = 100.0
+_WATCH_RATE_HZ = 10.0
 
 
 @dataclass(frozen=True, slots=True)
@@ -83,11 +86,15 @@ class FlightOutcome:
 
 
 async def fly(
-    setup: FlightSetup, on_progress: Callable[[Progress], None], on_checks: Callable[[Sequence[Check]], None]
+    setup: FlightSetup,
+    on_progress: Callable[[Progress], None],
+    on_checks: Callable[[Sequence[Check]], None],
+    live: LiveFeed | None = None,
 ) -> FlightOutcome:
     """Fly the mission. STOP_SIGNALS end it by the mission's reaction, not by killing this process.
 
-    `on_progress` hears a few times a second where the flight stands, `on_checks` once what pre-flight found.
+    `on_progress` hears a few times a second where the flight stands, `on_checks` once what pre-flight found. `live`
+    shows all that the log keeps, and hears the operator's wishes.
 
     Raises LogError when log or journal cannot be made, and GuardError; then nothing was connected.
     """
@@ -103,6 +110,11 @@ async def fly(
             clock=clock,
         ) as recorder,
     ):
+        log: FlightLog = recorder
+        if live is not None:
+            live.record(Briefing(plan.name, tuple(task.task for task in plan.tasks)))
+            live.record(recorder.mission)
+            log = WatchedLog(recorder, live)
         journal = _open_journal(path.with_suffix(SUFFIX))
         camera = setup.mission.camera
         make_worker = functools.partial(
@@ -112,8 +124,8 @@ async def fly(
         autopilot = MavsdkAutopilot(
             setup.connection,
             clock,
-            lambda text: recorder.record_status_text(clock.now_ns(), f"mavsdk {text}"),
-            recorder.record,
+            lambda text: log.record_status_text(clock.now_ns(), f"mavsdk {text}"),
+            log.record,
         )
         surroundings = Surroundings(
             Watched(
@@ -126,12 +138,12 @@ async def fly(
             )
         )
         for item in (camera, *flight_attachments(setup.mission, plan)):
-            recorder.record(item)
+            log.record(item)
         logbook = Logbook(journal, _papers(setup, path))
-        crew = Crew(autopilot, eyes, camera, recorder, logbook, surroundings.view)
+        crew = Crew(autopilot, eyes, camera, log, logbook, surroundings.view)
         executive = Executive(plan, crew, clock, setup.resumption, lambda checks: _before_arming(checks, on_checks))
         if setup.true_line is not None:
-            recorder.record(setup.true_line)
+            log.record(setup.true_line)
         eyes.start()
         with stop_signals(executive.request_stop):
             beating = asyncio.create_task(guard.beat(lambda: executive.tick_s))
@@ -140,9 +152,11 @@ async def fly(
                 asyncio.create_task(_every(_PROGRESS_RATE_HZ, 1.0, lambda: on_progress(executive.progress))),
             ]
             if setup.true_pose is not None:
-                sides.append(asyncio.create_task(_record_truth(setup.true_pose, recorder, clock)))
+                sides.append(asyncio.create_task(_record_truth(setup.true_pose, log, clock)))
             if setup.feed_pose is not None:
                 sides.append(asyncio.create_task(_feed(setup.feed_pose, autopilot)))
+            if live is not None:
+                sides.append(asyncio.create_task(be_watched(live, executive, log, clock)))
             try:
                 ended = await executive.run()
             finally:
@@ -158,6 +172,8 @@ async def fly(
                     eyes.stop()
                 await journal.close()
         on_progress(executive.progress)
+        if live is not None:
+            live.show(executive.progress)
     return FlightOutcome(ended, executive.may_have_armed, path, recorder.failure)
 
 
@@ -202,13 +218,29 @@ async def _every(rate_hz: float, speed: float, act: Callable[[], None]) -> None:
         await asyncio.sleep(1.0 / (rate_hz * speed))
 
 
-async def _record_truth(true_pose: Callable[[], TruePose | None], recorder: Recorder, clock: ScaledClock) -> None:
+async def _record_truth(true_pose: Callable[[], TruePose | None], log: FlightLog, clock: ScaledClock) -> None:
     def act() -> None:
         pose = true_pose()
         if pose is not None:
-            recorder.record(pose)
+            log.record(pose)
 
     await _every(_TRUTH_RATE_HZ, clock.speed, act)
+
+
+async def be_watched(live: LiveFeed, executive: Executive, log: FlightLog, clock: ScaledClock) -> None:
+    """Show the progress, and pass the operator's wishes on; a live view that has died is told once."""
+    is_told = False
+
+    def act() -> None:
+        nonlocal is_told
+        live.show(executive.progress)
+        for wish in live.wishes():
+            executive.request(wish)
+        if live.failure is not None and not is_told:
+            is_told = True
+            log.record(Event(clock.now_ns(), "live_view_lost", Severity.WARNING, live.failure))
+
+    await _every(_WATCH_RATE_HZ, 1.0, act)
 
 
 async def _feed(feed_pose: Callable[[VehicleState], None], autopilot: MavsdkAutopilot) -> None:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 from drivers.clock import NS_PER_S, Clock
 from mission import machine as m
-from mission.autopilot import Autopilot, AutopilotError, Setpoint
+from mission.autopilot import Autopilot, AutopilotError, LandedState, Setpoint
 from mission.build import build_task, guidance_settings, search_settings
 from mission.departure import Departure
 from mission.detours import Detour, detour_task
@@ -22,11 +22,13 @@ from mission.resumption import Resumption
 from mission.safety import Hazard, Reaction, way_down
 from mission.situation import Situation, Troubles
 from mission.tasks.go_down import GoDownTask
+from mission.tasks.hand_over import HandOverTask
 from mission.tasks.rejoin import RejoinTask
 from mission.tasks.task import Command, Task
 
 PAUSE_BEFORE_GOING_DOWN_S = 2.0
 GOING_DOWN_LIMIT_S = 300.0
+HANDING_OVER_LIMIT_S = 30.0
 REJOINING_LIMIT_S = 300.0
 
 _STAYS_CLEAR = ("takeoff", "ascend", "descend", "rotate", "hold", "land", "return")
@@ -35,6 +37,8 @@ _STAYS_CLEAR = ("takeoff", "ascend", "descend", "rotate", "hold", "land", "retur
 _TRIGGERS = {Result.FAILED: "fail", Result.TIMED_OUT: "fail", Result.INTERRUPTED: "interrupt"}
 _RESULTS = {
     Hazard.INTERRUPTED: Result.INTERRUPTED,
+    Hazard.OPERATOR_LAND: Result.INTERRUPTED,
+    Hazard.OPERATOR_HOLD: Result.INTERRUPTED,
     Hazard.TASK_TIMED_OUT: Result.TIMED_OUT,
     Hazard.TAKEOVER: Result.TAKEN_OVER,
     Hazard.AUTOPILOT_FAILSAFE: Result.TAKEN_OVER,
@@ -82,7 +86,7 @@ class Flow:
 
     @property
     def is_going_down(self) -> bool:
-        """Whether the mission was ended early, and the vehicle is on its way down."""
+        """Whether the mission was ended early, and the vehicle is on its way down, or into hold."""
         return self.machine.state == m.GOING_DOWN
 
     @property
@@ -195,7 +199,9 @@ class Flow:
 
     async def end_early(self, now_ns: int, hazard: Hazard, reaction: Reaction, words: str) -> None:
         """End the mission: give up control, or go down."""
-        reaction = way_down(reaction, may_be_over_line=self._may_be_over_line)
+        state = self._autopilot.state
+        is_on_ground = state is not None and state.landed is LandedState.ON_GROUND
+        reaction = way_down(reaction, may_be_over_line=self._may_be_over_line, is_on_ground=is_on_ground)
         self._log.record(Event(now_ns, hazard, Severity.ERROR, words, reaction))
         self.end = (_RESULTS.get(hazard, Result.FAILED), f"{hazard.replace('_', ' ')}: {words}")
         await self.end_task(*self.end)
@@ -206,7 +212,7 @@ class Flow:
             await self._go_down(hazard, reaction)
 
     async def _go_down(self, hazard: Hazard, reaction: Reaction) -> None:
-        """End the mission early: hold for a moment, then land or return."""
+        """End the mission early: hold for a moment, then land or return; or hold, and leave it at that."""
         await self.machine.trigger_named("go_down")
         self._situation.troubles = Troubles()
         self.detour = None
@@ -215,6 +221,9 @@ class Flow:
             await self.machine.trigger_named(_TRIGGERS[self.end[0]])
             return
         task, memory = self.task, self._situation.memory
+        if reaction is Reaction.HOLD_AND_END:
+            self.task = HandOverTask()
+            return
         if isinstance(task, GoDownTask):  # it is on its way: nothing is gained by another one
             if hazard is Hazard.TASK_TIMED_OUT:
                 self.task = GoDownTask(task.command, memory)
@@ -238,7 +247,7 @@ class Flow:
         if self.machine.state == m.REJOINING:
             limit_s, started_ns = REJOINING_LIMIT_S, self._task_started_ns
         elif index is None:
-            limit_s = GOING_DOWN_LIMIT_S
+            limit_s = HANDING_OVER_LIMIT_S if isinstance(task, HandOverTask) else GOING_DOWN_LIMIT_S
         else:
             limit_s = self._plan.tasks[index].time_limit_s
         return TaskView(
@@ -252,14 +261,14 @@ class Flow:
 
     def note_refusal(self, words: str) -> None:
         """On the way down a refusal is noted, and the task asks again; before that it is a hazard."""
-        if self.is_on_its_way_down:
+        if self.is_on_its_way_down or self.is_going_down:
             self._log.record(Event(self._clock.now_ns(), Hazard.COMMAND_REFUSED, Severity.WARNING, words))
         else:
             self._situation.troubles.refusal = words
 
     def note_bug(self, words: str) -> None:
         """A bug on the way down is noted, and the way down goes on: who gave up there would leave it in the air."""
-        if not self.is_on_its_way_down:
+        if not (self.is_on_its_way_down or self.is_going_down):
             self._situation.troubles.internal_error = words
         elif Hazard.INTERNAL_ERROR not in self._noted:
             self._noted.add(Hazard.INTERNAL_ERROR)

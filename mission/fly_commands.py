@@ -8,10 +8,20 @@ from typing import TYPE_CHECKING, Annotated, Literal, NoReturn
 import typer
 
 from mission.ending import EXIT_BAD_INPUT, EXIT_FAILED_FILE, EXIT_NOT_READY, fail, finish, read_mission
+from mission.live_options import (
+    LiveAddressOption,
+    LiveFoxglovePortOption,
+    LiveOption,
+    LivePortOption,
+    live_settings,
+    serve_live,
+    tell_live,
+)
 from mission.log.errors import LogError
 
 if TYPE_CHECKING:
     from mission.flight import FlightOutcome, FlightSetup
+    from mission.live.settings import LiveSettings
     from mission.plan import MissionPlan
     from mission.plan_file import MissionFile
     from mission.resumption import Resumption
@@ -51,6 +61,10 @@ def dry_run(
         typer.Option("--virtual-time", help="In one process, without MAVLink: as fast as it can, and always the same."),
     ] = False,
     log: LogOption = Path("logs"),
+    live: LiveOption = False,
+    live_port: LivePortOption = None,
+    live_address: LiveAddressOption = None,
+    live_foxglove_port: LiveFoxglovePortOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Fly a mission with the simulated vehicle in a rendered world."""
@@ -60,11 +74,14 @@ def dry_run(
 
     if virtual_time and speed != 1.0:
         fail("--virtual-time goes as fast as it can: leave out --speed.", EXIT_BAD_INPUT)
+    if virtual_time and live:
+        fail("--virtual-time goes too fast to be watched: leave out --live, or --virtual-time.", EXIT_BAD_INPUT)
+    watched = live_settings(live, live_port, live_address, live_foxglove_port)
     scenario = Scenario(world_path_or_name(world), light, seed, wind, _radians(wind_from), gust_fronts, airframe)
     try:
         if virtual_time:
             _fly_virtually(mission_file, scenario, log, as_json=as_json)
-        _fly_beside(mission_file, scenario, speed, log, as_json=as_json)
+        _fly_beside(mission_file, scenario, speed, log, watched, as_json=as_json)
     except WorldError as error:
         fail(str(error), EXIT_BAD_INPUT)
 
@@ -85,7 +102,13 @@ def _fly_virtually(mission_file: "MissionFile", scenario: "Scenario", log: Path,
 
 
 def _fly_beside(
-    mission_file: "MissionFile", scenario: "Scenario", speed: float, log: Path, *, as_json: bool
+    mission_file: "MissionFile",
+    scenario: "Scenario",
+    speed: float,
+    log: Path,
+    watched: "LiveSettings | None",
+    *,
+    as_json: bool,
 ) -> NoReturn:
     """Fly over MAVLink, with the simulated vehicle in a process of its own."""
     from drivers.clock import ScaledClock
@@ -109,7 +132,7 @@ def _fly_beside(
             true_line=true_line(simulation.world),
             true_pose=simulation.true_pose,
         )
-        outcome = _fly_watched(setup)
+        outcome = _fly_watched(setup, watched)
     finish(outcome, as_json=as_json, aftermath=simulation.aftermath)
 
 
@@ -120,12 +143,17 @@ def run(
     ] = None,
     camera: Annotated[str | None, typer.Option(help="v4l2:DEVICE, file:PATH or sim:WORLD; else the mission's.")] = None,
     log: LogOption = Path("logs"),
+    live: LiveOption = False,
+    live_port: LivePortOption = None,
+    live_address: LiveAddressOption = None,
+    live_foxglove_port: LiveFoxglovePortOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Fly a mission with a real vehicle, PX4 SITL, or `lineflight sitl`."""
     mission_file = read_mission(mission)
+    watched = live_settings(live, live_port, live_address, live_foxglove_port)
     plan = mission_file.plan
-    _run(mission_file, connection or plan.vehicle.connection, camera or plan.camera.source, log, as_json, None)
+    _run(mission_file, connection or plan.vehicle.connection, camera or plan.camera.source, log, as_json, None, watched)
 
 
 def _run(
@@ -135,6 +163,7 @@ def _run(
     log: Path,
     as_json: bool,
     resumed: "tuple[MissionPlan, Resumption] | None",
+    watched: "LiveSettings | None",
 ) -> NoReturn:
     """Fly a mission, or what is left of it, with a vehicle that flies elsewhere."""
     from mission.flight import FlightSetup
@@ -156,7 +185,7 @@ def _run(
             remaining=None if resumed is None else resumed[0],
             resumption=None if resumed is None else resumed[1],
         )
-        outcome = _fly_watched(setup)
+        outcome = _fly_watched(setup, watched)
     finish(outcome, as_json=as_json)
 
 
@@ -168,12 +197,17 @@ def resume(
     connection: Annotated[str | None, typer.Option(help="MAVSDK URL; else the interrupted flight's.")] = None,
     camera: Annotated[str | None, typer.Option(help="v4l2:DEVICE or sim:WORLD; else the interrupted flight's.")] = None,
     log: LogOption = Path("logs"),
+    live: LiveOption = False,
+    live_port: LivePortOption = None,
+    live_address: LiveAddressOption = None,
+    live_foxglove_port: LiveFoxglovePortOption = None,
     as_json: JsonOption = False,
 ) -> None:
     """Take an interrupted mission up again, from its journal: after a crash, a takeover, or a change of battery."""
     from mission.journal import DRY_RUN, JournalError, check_ended, newest_journal, read_journal
     from mission.resumption import CannotResumeError, explain_resumption, find_resumption
 
+    watched = live_settings(live, live_port, live_address, live_foxglove_port)
     try:
         path = journal or newest_journal(log)
         begin, entries = read_journal(path)
@@ -192,7 +226,8 @@ def resume(
         fail(str(error), EXIT_BAD_INPUT)
     if begin.camera == DRY_RUN and camera is None and connection is None:
         fail("That was a dry-run: its vehicle is gone. To try it, fly with lineflight sitl and run.", EXIT_BAD_INPUT)
-    _run(mission_file, connection or begin.connection, camera or begin.camera, log, as_json, (remaining, resumption))
+    resumed = remaining, resumption
+    _run(mission_file, connection or begin.connection, camera or begin.camera, log, as_json, resumed, watched)
 
 
 def _radians(degrees: float | None) -> float | None:
@@ -235,16 +270,21 @@ def sitl(
     )
 
 
-def _fly_watched(setup: "FlightSetup") -> "FlightOutcome":
+def _fly_watched(setup: "FlightSetup", watched: "LiveSettings | None") -> "FlightOutcome":
     from rich.console import Console
 
     from mission.flight import fly
     from mission.guard import GuardError
+    from mission.live.settings import LiveError
     from mission.watch import Watch
 
     try:
-        with Watch(setup.mission.plan, Console(stderr=True)) as watch:
-            return asyncio.run(fly(setup, watch.show, watch.tell_checks))
+        with serve_live(watched) as live, Watch(setup.mission.plan, Console(stderr=True)) as watch:
+            if live is not None and watched is not None:
+                tell_live(live, watched)
+            return asyncio.run(fly(setup, watch.show, watch.tell_checks, live))
+    except LiveError as error:
+        fail(str(error), EXIT_BAD_INPUT)
     except LogError as error:
         fail(str(error), EXIT_FAILED_FILE)
     except GuardError as error:

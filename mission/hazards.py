@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from drivers.clock import NS_PER_S
 from mission.autopilot import VehicleState
 from mission.mode_watch import ModeView
+from mission.operator import Wish
 from mission.safety import PRIORITY, Hazard
 
 
@@ -81,7 +82,7 @@ class SafetyInput:
     `was_armed` says that the vehicle was seen armed in this flight, `position_bad_s` for how long its position has been
     bad. `fence_breach`, `foreign_setpoint` (the autopilot flies another's), `tracking` (it does not follow ours),
     `refusal` (of a command, by the autopilot), `unsafe_setpoint` (not sent) and `internal_error` are sentences, None
-    where all is well.
+    where all is well. `wish` is what the operator asked for in the live view.
     """
 
     now_ns: int
@@ -100,6 +101,7 @@ class SafetyInput:
     unsafe_setpoint: str | None
     internal_error: str | None
     is_interrupted: bool
+    wish: Wish | None = None
 
 
 FALLING_M_S = 2.0
@@ -129,6 +131,8 @@ def find_hazards(seen: SafetyInput, limits: SafetyLimits) -> dict[Hazard, str]:
         Hazard.SETPOINT_UNSAFE: seen.unsafe_setpoint,
         Hazard.INTERNAL_ERROR: seen.internal_error,
         Hazard.INTERRUPTED: "the operator asked to stop" if seen.is_interrupted else None,
+        Hazard.OPERATOR_LAND: "the operator asked to land" if seen.wish is Wish.LAND else None,
+        Hazard.OPERATOR_HOLD: "the operator asked to hold" if seen.wish is Wish.HOLD else None,
     }
     found |= {hazard: words for hazard, words in sentences.items() if words is not None}
     return {hazard: found[hazard] for hazard in PRIORITY if hazard in found}

@@ -60,6 +60,8 @@ class Helm:
         elif step.command is Command.RETURN:
             # Its end, the landing, may be shown as LAND.
             await self._command(self._autopilot.return_home(), FlightMode.RETURN, FlightMode.LAND)
+        elif step.command is Command.HOLD:
+            await self.hold()
         elif step.command is Command.LAND:
             await self._command(self._autopilot.land(), FlightMode.LAND)
         if step.setpoint is not None:

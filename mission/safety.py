@@ -11,14 +11,15 @@ from collections.abc import Mapping
 class Reaction(enum.StrEnum):
     """What the executive does about a hazard, mildest first.
 
-    HOLD, CLIMB_AND_HOLD and SEARCH are pauses: the task goes on once the hazard is over. RETURN, LAND_CLEAR and LAND
-    end the mission.
+    HOLD, CLIMB_AND_HOLD and SEARCH are pauses: the task goes on once the hazard is over. HOLD_AND_END, RETURN,
+    LAND_CLEAR and LAND end the mission.
     """
 
     CONTINUE = "continue"
     HOLD = "hold"
     CLIMB_AND_HOLD = "climb_and_hold"
     SEARCH = "search"
+    HOLD_AND_END = "hold_and_end"
     RETURN = "return"
     LAND_CLEAR = "land_clear"
     LAND = "land"
@@ -44,6 +45,8 @@ class Hazard(enum.StrEnum):
     BATTERY_CRITICAL = "battery_critical"
     POSITION_BAD = "position_bad"
     INTERRUPTED = "interrupted"
+    OPERATOR_LAND = "operator_land"
+    OPERATOR_HOLD = "operator_hold"
     GEOFENCE = "geofence"
     TRACKING_ERROR = "tracking_error"
     GUARD_DEAD = "guard_dead"
@@ -82,6 +85,9 @@ FIXED_REACTIONS: Mapping[Hazard, Reaction] = {
     Hazard.COMMAND_REFUSED: Reaction.LAND_CLEAR,
     Hazard.INTERNAL_ERROR: Reaction.LAND_CLEAR,
     Hazard.SETPOINT_UNSAFE: Reaction.LAND_CLEAR,
+    # What the button says is what it does, whatever the mission.
+    Hazard.OPERATOR_LAND: Reaction.LAND_CLEAR,
+    Hazard.OPERATOR_HOLD: Reaction.HOLD_AND_END,
 }
 """The reactions that no mission file can change; the others stand in the plan's safety.reactions."""
 
@@ -130,8 +136,13 @@ def keep_going_down(hazards: Mapping[Hazard, str]) -> dict[Hazard, str]:
     return {hazard: words for hazard, words in hazards.items() if hazard in _MATTERS_ON_THE_WAY_DOWN}
 
 
-def way_down(reaction: Reaction, *, may_be_over_line: bool) -> Reaction:
-    """Resolve LAND_CLEAR: land here, unless the line may be below: then return, which lands where we took off."""
+def way_down(reaction: Reaction, *, may_be_over_line: bool, is_on_ground: bool = False) -> Reaction:
+    """Resolve LAND_CLEAR: land here, unless the line may be below: then return, which lands where we took off.
+
+    What has not left the ground cannot hold: HOLD_AND_END lands there, which disarms it.
+    """
+    if reaction is Reaction.HOLD_AND_END and is_on_ground:
+        return Reaction.LAND
     if reaction is not Reaction.LAND_CLEAR:
         return reaction
     return Reaction.RETURN if may_be_over_line else Reaction.LAND

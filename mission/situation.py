@@ -12,6 +12,7 @@ from mission.geofence import Fence, breach
 from mission.guidance import GuidanceSettings
 from mission.hazards import ComputerView, EyesView, SafetyInput, TaskView
 from mission.helm import Helm
+from mission.operator import Wish
 from mission.reporting import FlightLog
 from mission.tasks.task import FlightMemory, Sight
 from mission.watchers import Pace, TrackingWatch
@@ -65,6 +66,13 @@ class Situation:
         self.troubles = Troubles()
         self.was_armed = False
         self.is_interrupted = False
+        self.wish: Wish | None = None
+        """What the operator asked for last."""
+
+    @property
+    def is_asked_to_end(self) -> bool:
+        """Whether somebody wants the flight to end, in whatever way."""
+        return self.is_interrupted or self.wish is not None
 
     def begin(self, memory: FlightMemory) -> None:
         """The flight begins."""
@@ -157,4 +165,5 @@ class Situation:
             unsafe_setpoint=troubles.unsafe_setpoint,
             internal_error=troubles.internal_error,
             is_interrupted=self.is_interrupted,
+            wish=self.wish,
         )

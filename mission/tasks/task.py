@@ -59,6 +59,7 @@ class Command(enum.Enum):
     """What only the autopilot's own modes can do."""
 
     ARM = enum.auto()
+    HOLD = enum.auto()
     TAKEOFF = enum.auto()
     RETURN = enum.auto()
     LAND = enum.auto()

@@ -8,6 +8,7 @@ from typing import cast
 from mission.autopilot import Setpoint
 from mission.eyes import Notice
 from mission.hazards import ComputerView
+from mission.operator import Wish
 from mission.simulated.virtual_time import VirtualTimeLoop
 from mission.tasks.task import Observation, Step
 from sitl.modes import Mode
@@ -238,6 +239,15 @@ def _stop(cockpit: Cockpit) -> None:
     cockpit.executive.request_stop()
 
 
+def _wish(wish: Wish, trouble: str | None = None) -> Callable[[Cockpit], None]:
+    def ask(cockpit: Cockpit) -> None:
+        if trouble is not None:
+            cockpit.autopilot.faults |= {name: [trouble, trouble] for name in ("hold", "return", "land")}
+        cockpit.executive.request(wish)
+
+    return ask
+
+
 FAULTS = (
     Fault("pilot_hold", "the pilot switches to hold", _pilot(Mode.LOITER), is_takeover=True),
     Fault("pilot_return", "the pilot switches to return", _pilot(Mode.RTL), is_takeover=True),
@@ -262,6 +272,9 @@ FAULTS = (
     Fault("gps_lost", "GPS is gone", _lose_gps, may_touch_line=True),
     Fault("gps_flickers", "GPS is gone for 4.5 s", _flicker_gps),
     Fault("operator_stop", "Ctrl-C", _stop),
+    Fault("operator_land", "Land in the live view", _wish(Wish.LAND)),
+    Fault("operator_hold", "Hold in the live view", _wish(Wish.HOLD)),
+    Fault("operator_hold_unanswered", "the same, and the answers get lost twice", _wish(Wish.HOLD, "lost")),
     Fault("fence", "the vehicle is outside the fence", _shrink_fence),
     Fault("gale", "20 m/s of wind for 15 s", _gale),
     Fault("vision_dead", "the vision worker is dead", _kill_vision),

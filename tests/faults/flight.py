@@ -37,7 +37,7 @@ _AFTERWARDS_S = 150.0
 _PILOTS_S = 15.0
 _SAY_FOR_S = 1.2  # a takeover shows with the next heartbeat
 _STEP_S = 0.01
-_LOW_BATTERY = 0.06
+_LOW_BATTERY = 0.0695  # a battery that empties comes from above: just below PX4's BAT_CRIT_THR
 
 
 @dataclass

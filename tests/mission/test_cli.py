@@ -1,6 +1,7 @@
 """The command line: what it answers to good and to bad input. Nothing here flies."""
 
 import json
+import socket
 from pathlib import Path
 
 import cv2
@@ -159,3 +160,42 @@ def test_a_log_folder_that_cannot_be_made_ends_before_connecting(tmp_path: Path)
     ran = lineflight("run", MISSION, "--camera", f"file:{tmp_path}", "--log", blocker / "logs")
     assert_plain(ran, 1)
     assert "cannot be made" in ran.err
+
+
+def test_a_live_view_needs_real_time() -> None:
+    ran = lineflight("dry-run", MISSION, "--virtual-time", "--live")
+    assert_plain(ran, 2)
+    assert ran.err == "--virtual-time goes too fast to be watched: leave out --live, or --virtual-time.\n"
+
+
+@pytest.mark.parametrize(
+    "option", [("--live-port", "9000"), ("--live-address", "192.168.7.2"), ("--live-foxglove-port", "9")]
+)
+@pytest.mark.parametrize("command", ["run", "dry-run"])
+def test_options_of_the_live_view_need_it(tmp_path: Path, command: str, option: tuple[str, str]) -> None:
+    ran = lineflight(command, MISSION, *option, "--log", tmp_path / "logs")
+    assert_plain(ran, 2)
+    assert "belong to --live" in ran.err
+    assert not (tmp_path / "logs").exists()
+
+
+def test_a_live_view_that_cannot_be_served_is_said_before_anything_connects(tmp_path: Path) -> None:
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = str(taken.getsockname()[1])
+        ran = lineflight(
+            "run",
+            MISSION,
+            "--camera",
+            f"file:{MISSION.parent}",
+            "--live",
+            "--live-port",
+            port,
+            "--log",
+            tmp_path / "logs",
+        )
+    assert_plain(ran, 2)
+    assert f"127.0.0.1:{port}" in ran.err
+    assert "--live-port" in ran.err
+    assert not (tmp_path / "logs").exists()

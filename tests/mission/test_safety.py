@@ -9,6 +9,7 @@ from mission.autopilot import FlightMode, LandedState, VehicleState
 from mission.build import reactions, safety_limits
 from mission.hazards import ComputerView, EyesView, PaceView, SafetyInput, TaskView, find_hazards
 from mission.mode_watch import ModeView
+from mission.operator import Wish
 from mission.plan import SafetyPlan
 from mission.safety import (
     FIXED_REACTIONS,
@@ -65,6 +66,8 @@ CAUSES = {
     Hazard.BATTERY_CRITICAL: replace(CALM, state=replace(STATE, battery=0.1)),
     Hazard.POSITION_BAD: replace(CALM, position_bad_s=1.6),
     Hazard.INTERRUPTED: replace(CALM, is_interrupted=True),
+    Hazard.OPERATOR_LAND: replace(CALM, wish=Wish.LAND),
+    Hazard.OPERATOR_HOLD: replace(CALM, wish=Wish.HOLD),
     Hazard.GEOFENCE: replace(CALM, fence_breach="too far"),
     Hazard.TRACKING_ERROR: replace(CALM, tracking="left behind"),
     Hazard.GUARD_DEAD: replace(CALM, computer=ComputerView(guard_failure="gone")),
@@ -96,6 +99,8 @@ EXPECTED_REACTION = {
     Hazard.BATTERY_CRITICAL: Reaction.LAND_CLEAR,
     Hazard.POSITION_BAD: Reaction.HOLD,
     Hazard.INTERRUPTED: Reaction.LAND_CLEAR,
+    Hazard.OPERATOR_LAND: Reaction.LAND_CLEAR,
+    Hazard.OPERATOR_HOLD: Reaction.HOLD_AND_END,
     Hazard.GEOFENCE: Reaction.RETURN,
     Hazard.TRACKING_ERROR: Reaction.RETURN,
     Hazard.GUARD_DEAD: Reaction.RETURN,
@@ -215,6 +220,13 @@ def test_we_never_land_on_the_line_unless_told_to(reaction: Reaction, may_be_ove
         assert resolved is (Reaction.RETURN if may_be_over_line else Reaction.LAND)
     else:
         assert resolved is reaction
+
+
+def test_what_stands_on_the_ground_cannot_hold() -> None:
+    for reaction in Reaction:
+        resolved = way_down(reaction, may_be_over_line=False, is_on_ground=True)
+        down = (Reaction.HOLD_AND_END, Reaction.LAND_CLEAR)
+        assert resolved is (Reaction.LAND if reaction in down else reaction)
 
 
 @pytest.mark.parametrize("hazard", [Hazard.LINK_LOST, Hazard.TELEMETRY_STALE])

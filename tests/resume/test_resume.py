@@ -10,6 +10,7 @@ import pytest
 
 from mission.autopilot import GlobalPoint
 from mission.journal import DiskJournal, JournalError, Transition, newest_journal, read_journal
+from mission.operator import Wish
 from mission.records import MissionEnded, Result, TaskEnded
 from mission.resumption import CannotResumeError, explain_resumption, find_resumption
 from mission.simulated.virtual_time import VirtualClock, run_virtually
@@ -26,11 +27,15 @@ Act = Callable[[FaultyAutopilot], None]
 
 @dataclass
 class Stage:
-    """One program: it is stopped `stop_s` after its start by `act` (a kill, if None); None: it ends by itself."""
+    """One program: it is stopped `stop_s` after its start by `act` (a kill, if None); None: it ends by itself.
+
+    With a `wish` the operator stops it.
+    """
 
     stop_s: float | None = None
     act: Act | None = None
     pause_s: float = 3.0
+    wish: Wish | None = None
 
 
 @dataclass
@@ -71,7 +76,9 @@ def fly_in_stages(folder: Path, *stages: Stage) -> Story:
             running = asyncio.create_task(program.run())
             if stage.stop_s is not None:
                 await asyncio.sleep(stage.stop_s)
-                if stage.act is None:
+                if stage.wish is not None:
+                    program.request(stage.wish)
+                elif stage.act is None:
                     disk.is_alive = False
                     link.die()
                     running.cancel()
@@ -115,6 +122,15 @@ def all_once(tasks: list[str]) -> bool:
 def test_a_pilot_hands_back_and_the_mission_goes_on(stop_s: float, act: Act, tmp_path: Path) -> None:
     story = fly_in_stages(tmp_path, Stage(stop_s, act), Stage())
     assert [end.result for end in story.ends if end] == [Result.TAKEN_OVER, Result.COMPLETED]
+    assert all_once(story.tasks)
+    assert "arm" not in story.commands[1]
+    assert story.least_clearance_m > CLEARANCE_M
+
+
+@pytest.mark.parametrize("stop_s", [18.0, 28.0, 38.0, 44.0])
+def test_an_operator_holds_and_the_mission_goes_on(stop_s: float, tmp_path: Path) -> None:
+    story = fly_in_stages(tmp_path, Stage(stop_s, wish=Wish.HOLD), Stage())
+    assert [end.result for end in story.ends if end] == [Result.INTERRUPTED, Result.COMPLETED]
     assert all_once(story.tasks)
     assert "arm" not in story.commands[1]
     assert story.least_clearance_m > CLEARANCE_M

@@ -1,0 +1,396 @@
+"""A flight's records in Foxglove's words: the channels, and the two sinks that they go to, a log and a live stream.
+
+The only file that imports foxglove.
+"""
+
+import functools
+import json
+import math
+import queue
+import time
+from collections.abc import Callable, Iterable
+from typing import Any
+
+import foxglove
+import numpy as np
+from foxglove import channels as fox_channels
+from foxglove import messages as fox
+from foxglove.mcap import MCAPWriteOptions, MCAPWriter
+from foxglove.websocket import ChannelView, Client, ServerListener
+
+from drivers.camera.camera import Intrinsics
+from drivers.clock import NS_PER_S
+from mission.autopilot import GlobalPoint, Setpoint, VehicleState
+from mission.geodesy import point_at
+from mission.log import channels
+from mission.log.disk import LogFile
+from mission.log.records import LoggedMission, LogHealth, SentSetpoint, StatusText, VisionEntry
+from mission.log.wording import line_of
+from mission.records import (
+    Attachment,
+    AutopilotTarget,
+    ClockSync,
+    ControlTick,
+    Event,
+    LineFix,
+    MissionEnded,
+    Origin,
+    PreflightCheck,
+    Severity,
+    TaskEnded,
+    TaskStarted,
+    TrueLine,
+    TruePose,
+)
+from vision.records import VisionReport
+
+_CHUNK_BYTES = 256 * 1024
+_LASTING = (LoggedMission, Origin, TrueLine, PreflightCheck)  # what who comes later wants to be told, too
+_LIVE_BACKLOG = 256  # messages for each viewer: what a slow one does not take in time is dropped
+
+_MAP_FROM_NED = fox.Quaternion(x=math.sqrt(0.5), y=math.sqrt(0.5), z=0.0, w=0.0)  # ENU, which viewers hold upright
+_FRD_FROM_CAMERA = fox.Quaternion(x=0.0, y=0.0, z=math.sqrt(0.5), w=math.sqrt(0.5))  # looks down, its top forward
+_DISTORTION_MODEL = {"pinhole": "plumb_bob", "fisheye": "kannala_brandt"}
+_IDENTITY = fox.Pose(position=fox.Vector3(), orientation=fox.Quaternion(w=1.0))
+_LINE_COLOR = fox.Color(r=1.0, g=0.72, b=0.1, a=1.0)
+_SUPPORT_COLOR = fox.Color(r=0.55, g=0.45, b=0.35, a=1.0)
+_LOG_LEVEL = {
+    Severity.INFO: fox.LogLevel.Info,
+    Severity.WARNING: fox.LogLevel.Warning,
+    Severity.ERROR: fox.LogLevel.Error,
+}
+
+
+class Encoder:
+    """The channels of one flight.
+
+    Each record goes to its own JSON channel, and where a viewer can show it, to Foxglove's own. Every sink of `context`
+    hears them. `newest_ns` is the newest time [ns, flight] of any record.
+    """
+
+    def __init__(self, context: foxglove.Context, mission: LoggedMission) -> None:
+        self._context = context  # its channels close when it goes
+        self._offset_ns = mission.unix_minus_flight_ns
+        self._start_ns = self.newest_ns = mission.start_ns
+        self._limits = {
+            channel.record: channels.RateLimit(channel.max_rate_hz)
+            for channel in channels.RECORD_CHANNELS
+            if channel.max_rate_hz is not None
+        }
+        self._origin: GlobalPoint | None = None
+        self._location_limit = channels.RateLimit(channels.LOCATION_RATE_HZ)
+        self._lasting: dict[str, list[Callable[[], None]]] = {}
+        self._json = {
+            channel.record: foxglove.Channel(
+                channel.topic,
+                schema=foxglove.Schema(
+                    name=f"lineflight.{channel.record.__name__}",
+                    encoding="jsonschema",
+                    data=json.dumps(channels.json_schema(channel.record)).encode(),
+                ),
+                message_encoding="json",
+                metadata={"what": channel.what, "rate": channel.rate},
+                context=context,
+            )
+            for channel in channels.RECORD_CHANNELS
+        }
+        self._foxglove = {
+            channel.topic: getattr(fox_channels, channel.schema.removeprefix("foxglove.") + "Channel")(
+                channel.topic, metadata={"what": channel.what, "rate": channel.rate}, context=context
+            )
+            for channel in channels.FOXGLOVE_CHANNELS
+        }
+
+    def write(self, record: object) -> None:
+        """Write a record to every channel that shows it. Raises KeyError for a type that the table lacks."""
+        _WRITE[type(record)](self, record)
+
+    def repeat(self, topic: str) -> None:
+        """Write again what a topic said once and for all, for a viewer who came later."""
+        for write in self._lasting.get(topic, []):
+            write()
+
+    def write_plain(self, record: Any) -> None:
+        """Write a record as JSON; a channel with a rate limit skips what comes sooner."""
+        t_ns = getattr(record, "t_ns", self._start_ns)
+        self.newest_ns = max(self.newest_ns, t_ns)
+        limit = self._limits.get(type(record))
+        if limit is None or limit.admits(t_ns):
+            self._log(self._json[type(record)], channels.encode(record), t_ns, is_lasting=type(record) in _LASTING)
+
+    def write_vision(self, report: VisionReport) -> None:
+        """Write what vision saw, with the frame and the lines on it where the report has it."""
+        lines_px = np.round(report.power_lines, 2).tolist()
+        self.write_plain(
+            VisionEntry(
+                t_ns=report.t_capture_ns,
+                seq=report.seq,
+                estimate=report.estimate,
+                track=report.track,
+                trouble=report.trouble,
+                power_lines_px=tuple((x1, y1, x2, y2) for x1, y1, x2, y2 in lines_px),
+                latency_ns=report.latency_ns,
+                work_ns=report.work_ns,
+                n_dropped=report.n_dropped,
+                has_image=report.jpeg is not None,
+            )
+        )
+        if report.jpeg is None:
+            return
+        stamp = self._stamp(report.t_capture_ns)
+        image = fox.CompressedImage(timestamp=stamp, frame_id="camera", data=report.jpeg, format="jpeg")
+        self._show(channels.IMAGE, report.t_capture_ns, image)
+        ends = [fox.Point2(x=x, y=y) for x1, y1, x2, y2 in lines_px for x, y in ((x1, y1), (x2, y2))]
+        lines = fox.PointsAnnotation(
+            timestamp=stamp, type=fox.PointsAnnotationType.LineList, points=ends, outline_color=_LINE_COLOR, thickness=2
+        )
+        annotations = fox.ImageAnnotations(timestamp=stamp, points=[lines] if ends else [])
+        self._show(channels.ANNOTATIONS, report.t_capture_ns, annotations)
+
+    def write_state(self, state: VehicleState) -> None:
+        """Write the vehicle, its pose, and its place on Earth once the origin is known."""
+        self.write_plain(state)
+        stamp = self._stamp(state.t_ns)
+        position = fox.Vector3(x=state.north_m, y=state.east_m, z=state.down_m)
+        attitude = _quaternion(state.roll_rad, state.pitch_rad, state.yaw_rad)
+        pose = fox.Pose(position=position, orientation=attitude)
+        self._show(channels.POSE, state.t_ns, fox.PoseInFrame(timestamp=stamp, frame_id="ned", pose=pose))
+        transform = fox.FrameTransform(
+            timestamp=stamp, parent_frame_id="ned", child_frame_id="vehicle", translation=position, rotation=attitude
+        )
+        self._show(channels.TRANSFORM, state.t_ns, transform)
+        if self._origin is not None and self._location_limit.admits(state.t_ns):
+            here = point_at(Setpoint(state.north_m, state.east_m, state.down_m, state.yaw_rad), self._origin)
+            fix = fox.LocationFix(
+                timestamp=stamp,
+                frame_id="vehicle",
+                latitude=math.degrees(here.latitude_rad),
+                longitude=math.degrees(here.longitude_rad),
+                altitude=here.altitude_m,
+            )
+            self._show(channels.LOCATION, state.t_ns, fix)
+
+    def write_origin(self, origin: Origin) -> None:
+        """Write where the local frame lies; from now on the vehicle's places on Earth are known."""
+        self.write_plain(origin)
+        self._origin = GlobalPoint(origin.latitude_rad, origin.longitude_rad, origin.altitude_m)
+
+    def write_camera(self, camera: Intrinsics) -> None:
+        """Write the camera's calibration, and how it is mounted."""
+        stamp = self._stamp(self._start_ns)
+        fx, fy, cx, cy = camera.fx_px, camera.fy_px, camera.cx_px, camera.cy_px
+        calibration = fox.CameraCalibration(
+            timestamp=stamp,
+            frame_id="camera",
+            width=camera.width_px,
+            height=camera.height_px,
+            distortion_model=_DISTORTION_MODEL[camera.lens],
+            D=list(camera.distortion),
+            K=[fx, 0.0, cx, 0.0, fy, cy, 0.0, 0.0, 1.0],
+            P=[fx, 0.0, cx, 0.0, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0],
+        )
+        self._show(channels.CALIBRATION, self._start_ns, calibration, is_lasting=True)
+        mount = fox.FrameTransform(
+            timestamp=stamp,
+            parent_frame_id="vehicle",
+            child_frame_id="camera",
+            translation=fox.Vector3(),
+            rotation=_FRD_FROM_CAMERA,
+        )
+        self._show(channels.TRANSFORM, self._start_ns, mount, is_lasting=True)
+
+    def write_mission(self, mission: LoggedMission) -> None:
+        """Write what is flown, and how the map lies."""
+        self.write_plain(mission)
+        world = fox.FrameTransform(
+            timestamp=self._stamp(self._start_ns),
+            parent_frame_id="map",
+            child_frame_id="ned",
+            translation=fox.Vector3(),
+            rotation=_MAP_FROM_NED,
+        )
+        self._show(channels.TRANSFORM, self._start_ns, world, is_lasting=True)
+
+    def write_line(self, line: TrueLine) -> None:
+        """Write the simulated line, and its scene."""
+        self.write_plain(line)
+        wires = [_polyline(conductor, 0.05, _LINE_COLOR) for conductor in line.conductors_ned_m]
+        poles = [_polyline(((n, e, d), (n, e, 0.0)), 0.3, _SUPPORT_COLOR) for n, e, d in line.supports_ned_m]
+        stamp = self._stamp(self._start_ns)
+        entity = fox.SceneEntity(timestamp=stamp, frame_id="ned", id="power line", lines=[*wires, *poles])
+        self._show(channels.SCENE, self._start_ns, fox.SceneUpdate(entities=[entity]), is_lasting=True)
+
+    def write_worded(self, record: Any) -> None:
+        """Write a record that also reads as a line of text."""
+        self.write_plain(record)
+        name, severity, text = line_of(record)
+        message = fox.Log(timestamp=self._stamp(record.t_ns), level=_LOG_LEVEL[severity], name=name, message=text)
+        self._show(channels.LOG, record.t_ns, message)
+
+    def _show(self, channel: channels.FoxgloveChannel, t_ns: int, message: Any, *, is_lasting: bool = False) -> None:
+        self._log(self._foxglove[channel.topic], message, t_ns, is_lasting=is_lasting)
+
+    def _log(self, channel: Any, message: Any, t_ns: int, *, is_lasting: bool) -> None:
+        write = functools.partial(channel.log, message, log_time=t_ns + self._offset_ns)
+        if is_lasting:
+            self._lasting.setdefault(channel.topic(), []).append(write)
+        write()
+
+    def _stamp(self, t_ns: int) -> fox.Timestamp:
+        return fox.Timestamp(*divmod(t_ns + self._offset_ns, NS_PER_S))
+
+
+_WRITE: dict[type, Callable[[Encoder, Any], None]] = {
+    LoggedMission: Encoder.write_mission,
+    VehicleState: Encoder.write_state,
+    SentSetpoint: Encoder.write_plain,
+    VisionReport: Encoder.write_vision,
+    PreflightCheck: Encoder.write_worded,
+    TaskStarted: Encoder.write_worded,
+    TaskEnded: Encoder.write_worded,
+    MissionEnded: Encoder.write_worded,
+    Event: Encoder.write_worded,
+    StatusText: Encoder.write_worded,
+    LineFix: Encoder.write_plain,
+    AutopilotTarget: Encoder.write_plain,
+    ClockSync: Encoder.write_plain,
+    ControlTick: Encoder.write_plain,
+    LogHealth: Encoder.write_plain,
+    Origin: Encoder.write_origin,
+    Intrinsics: Encoder.write_camera,
+    TruePose: Encoder.write_plain,
+    TrueLine: Encoder.write_line,
+}
+
+
+class McapLog:
+    """An MCAP file as an encoder's sink. `newest_ns` is the newest time [ns, flight] of any record."""
+
+    def __init__(self, file: LogFile, mission: LoggedMission) -> None:
+        context = foxglove.Context()
+        # Without seeking, a chunk is written whole once it is full: a file cut anywhere holds only whole chunks.
+        options = MCAPWriteOptions(
+            profile=channels.PROFILE, chunk_size=_CHUNK_BYTES, disable_seeking=True, compression_threads=0
+        )
+        self._mcap: MCAPWriter = foxglove.open_mcap(file, context=context, writer_options=options)
+        self._encoder = Encoder(context, mission)
+        self._mcap.write_metadata(
+            channels.PROFILE,
+            {
+                **mission.metadata,
+                "mission": mission.name,
+                "mission_sha256": mission.sha256,
+                "unix_minus_flight_ns": str(mission.unix_minus_flight_ns),
+            },
+        )
+
+    @property
+    def newest_ns(self) -> int:
+        """The newest time [ns, flight] of any record."""
+        return self._encoder.newest_ns
+
+    def write(self, record: object) -> None:
+        """Write a record to every channel that shows it, a file as it is. Raises KeyError for any other type."""
+        if isinstance(record, Attachment):
+            self._attach(record)
+        else:
+            self._encoder.write(record)
+
+    def flush(self) -> None:
+        """Hand over to the file what is still in memory."""
+        self._mcap.flush()
+
+    def close(self) -> None:
+        """Finish the file."""
+        self._mcap.close()
+
+    def _attach(self, attachment: Attachment) -> None:
+        now_ns = time.time_ns()
+        self._mcap.attach(
+            log_time=now_ns,
+            create_time=now_ns,
+            name=attachment.name,
+            media_type=attachment.media_type,
+            data=attachment.data,
+        )
+
+
+class LiveStream:
+    """The same channels for viewers: a WebSocket server that Foxglove connects to; it takes nothing from them.
+
+    It serves from threads of its own and drops what a slow viewer does not take. Raises OSError, in words for people,
+    when it cannot be opened. `port` 0 takes any free one.
+    """
+
+    def __init__(self, address: str, port: int) -> None:
+        self._context = foxglove.Context()
+        self._newcomers: queue.SimpleQueue[str] = queue.SimpleQueue()
+        foxglove.set_log_level("CRITICAL")  # a viewer that goes without a word is nobody's business
+        try:
+            self._server = foxglove.start_server(
+                name="lineflight",
+                host=address,
+                port=port,
+                server_listener=_Newcomers(self._newcomers),
+                context=self._context,
+                message_backlog_size=_LIVE_BACKLOG,
+            )
+        except RuntimeError as error:
+            raise OSError(str(error)) from None
+        self._encoder: Encoder | None = None
+
+    @property
+    def port(self) -> int:
+        """The port that it listens on."""
+        return int(self._server.port)
+
+    def write(self, record: object) -> None:
+        """Send a record to whoever watches. What comes before the flight's LoggedMission is not sent, nor are files."""
+        if isinstance(record, LoggedMission):
+            self._encoder = Encoder(self._context, record)
+        if self._encoder is not None and type(record) in _WRITE:
+            self._encoder.write(record)
+
+    def welcome(self) -> None:
+        """Tell those who came since the last call what was said once and for all."""
+        while not self._newcomers.empty():
+            topic = self._newcomers.get()
+            if self._encoder is not None:
+                self._encoder.repeat(topic)
+
+    def close(self) -> None:
+        """Serve no more."""
+        self._server.stop()
+
+
+class _Newcomers(ServerListener):  # type: ignore[misc]  # foxglove is untyped here
+    """Keeps which topics somebody has just begun to listen to."""
+
+    def __init__(self, topics: "queue.SimpleQueue[str]") -> None:
+        self._topics = topics
+
+    def on_subscribe(self, client: Client, channel: ChannelView) -> None:
+        """Somebody begins to listen; called by a thread of the server."""
+        self._topics.put(channel.topic)
+
+
+def _quaternion(roll_rad: float, pitch_rad: float, yaw_rad: float) -> fox.Quaternion:
+    """ned_from_frd of an attitude in yaw, pitch, roll order."""
+    cr, sr = math.cos(roll_rad / 2), math.sin(roll_rad / 2)
+    cp, sp = math.cos(pitch_rad / 2), math.sin(pitch_rad / 2)
+    cy, sy = math.cos(yaw_rad / 2), math.sin(yaw_rad / 2)
+    return fox.Quaternion(
+        w=cr * cp * cy + sr * sp * sy,
+        x=sr * cp * cy - cr * sp * sy,
+        y=cr * sp * cy + sr * cp * sy,
+        z=cr * cp * sy - sr * sp * cy,
+    )
+
+
+def _polyline(
+    points_ned_m: Iterable[tuple[float, float, float]], width_m: float, color: fox.Color
+) -> fox.LinePrimitive:
+    points = [fox.Point3(x=north, y=east, z=down) for north, east, down in points_ned_m]
+    return fox.LinePrimitive(
+        type=fox.LinePrimitiveLineType.LineStrip, thickness=width_m, points=points, color=color, pose=_IDENTITY
+    )
