@@ -37,6 +37,8 @@ app.command()(fly_commands.run)
 app.command()(fly_commands.resume)
 app.command()(fly_commands.sitl)
 app.command()(inspect_commands.inspect)
+app.command()(inspect_commands.compare)
+app.command()(inspect_commands.replay)
 app.command("import")(import_commands.import_log)
 
 

@@ -2,8 +2,8 @@
 
 Exit codes: 0 done · 1 a log could not be written, or some of the images not read · 2 bad input (a mission, world,
 camera, log or option that cannot be used), nothing was connected · 3 not ready, the vehicle was never armed · 4 the
-mission ended early · 5 the pilot, or the autopilot's failsafe, has the vehicle · 70 a fault of lineflight's own ·
-130 stopped by the operator.
+mission ended early · 5 the pilot, or the autopilot's failsafe, has the vehicle · 6 what was compared differs by more
+than is allowed · 70 a fault of lineflight's own · 130 stopped by the operator.
 """
 
 import json
@@ -27,6 +27,7 @@ EXIT_BAD_INPUT = 2
 EXIT_NOT_READY = 3
 EXIT_ENDED_EARLY = 4
 EXIT_TAKEN_OVER = 5
+EXIT_DIFFERENT = 6
 EXIT_FAULT = 70
 EXIT_INTERRUPTED = 130
 

@@ -32,7 +32,7 @@ def import_log(
     from mission.imports.errors import AutopilotLogError, NoMatchError
     from mission.imports.lay_beside import align_best, imported_log, on_our_time_line
     from mission.imports.open import digest, read_autopilot_log
-    from mission.imports.write import CopyError, write_copy
+    from mission.log.copying import CopyError, write_copy
 
     out = log.with_name(f"{log.stem}-with-autopilot.mcap") if out is None else out
     if out.exists():

@@ -1,12 +1,13 @@
-"""`lineflight inspect`: what happened on a flight."""
+"""`lineflight inspect`, `compare` and `replay`: what happened on a flight, and what would happen today."""
 
+import json
 import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mission.ending import EXIT_BAD_INPUT, EXIT_FAILED_FILE, fail, print_report
+from mission.ending import EXIT_BAD_INPUT, EXIT_DIFFERENT, EXIT_FAILED_FILE, fail, print_report
 from mission.fly_commands import JsonOption
 from mission.log.errors import LogError
 
@@ -40,6 +41,97 @@ def inspect(
     print_report(report, as_json=as_json)
     if html is not None:
         write_page(html, text)
+
+
+def compare(
+    logs: Annotated[list[Path], typer.Argument(metavar="LOG LOG...", help="Flight logs (.mcap), two at least.")],
+    html: Annotated[Path | None, typer.Option("--html", help="Write one page, to open without a network.")] = None,
+    fail_if: Annotated[
+        list[str] | None,
+        typer.Option(help="End with exit code 6 where this holds: lateral_p95_m>0.5, or change:latency_p95_ms>20."),
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Hold flights against the first one, figure by figure and task by task.
+
+    A condition is on the last flight's figure, or with change: on how it differs from the first one's.
+    """
+    from rich.console import Console
+
+    from mission.compare.comparison import compare_reports
+    from mission.compare.conditions import ConditionError, parse_condition
+    from mission.compare.report import print_comparison
+    from mission.log.inspection import inspect_flight
+    from mission.log.reader import read_flight
+
+    if len(logs) < 2:
+        fail("compare needs two logs at least; name another one.", EXIT_BAD_INPUT)
+    try:
+        flights = [read_flight(log) for log in logs]
+        comparison = compare_reports([log.stem for log in logs], [inspect_flight(flight) for flight in flights])
+        conditions = [parse_condition(text, comparison.figure_names) for text in fail_if or ()]
+    except (LogError, ConditionError) as error:
+        fail(str(error), EXIT_BAD_INPUT)
+    found = [condition.failure(comparison.figures[0], comparison.figures[-1]) for condition in conditions]
+    failures = [words for words in found if words is not None]
+    if as_json:
+        typer.echo(json.dumps(comparison.to_json() | {"failures": failures}))
+    else:
+        print_comparison(comparison, Console())
+    if html is not None:
+        from mission.compare.page import comparison_page
+
+        write_page(html, comparison_page(comparison, flights))
+    if failures:
+        fail("\n".join(failures), EXIT_DIFFERENT)
+
+
+def replay(
+    log: LogArgument,
+    write: Annotated[
+        Path | None, typer.Option("--write", help="Write a copy of the log that holds this replay as its reference.")
+    ] = None,
+    as_json: JsonOption = False,
+) -> None:
+    """Run today's vision and guidance on a log's frames and states, and say where they differ.
+
+    A log that holds a reference is held against that, and the exit code is 6 where it differs beyond the tolerance.
+    """
+    from rich.console import Console
+    from rich.progress import Progress, SpinnerColumn, TextColumn
+
+    from mission.log.copying import CopyError
+    from mission.log.reader import read_flight
+    from mission.replay.differences import Tolerance
+    from mission.replay.replay import differences, write_reference
+    from mission.replay.replay import replay as fly_again
+    from mission.replay.report import print_differences
+
+    shown = Progress(
+        SpinnerColumn(),
+        TextColumn("frame {task.completed} of {task.total}"),
+        console=Console(stderr=True),
+        transient=True,
+    )
+    try:
+        flight = read_flight(log)
+        with shown as progress:
+            frames = progress.add_task("", total=len(flight.image_times_ns))
+            replayed = fly_again(flight, lambda: progress.advance(frames))
+        found = differences(flight, replayed)
+        if write is not None:
+            write_reference(flight, replayed, write, lambda _: None)
+    except LogError as error:
+        fail(str(error), EXIT_BAD_INPUT)
+    except CopyError as error:
+        fail(str(error), EXIT_FAILED_FILE)
+    beyond = found.beyond(Tolerance()) if found.is_reference else ()
+    if as_json:
+        typer.echo(json.dumps(found.to_json() | {"beyond": list(beyond)}))
+    else:
+        print_differences(found, beyond, Console())
+    if beyond:
+        raise typer.Exit(EXIT_DIFFERENT)
 
 
 def write_page(path: Path, text: str) -> None:

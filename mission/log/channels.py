@@ -33,6 +33,7 @@ from mission.records import (
     TrueLine,
     TruePose,
 )
+from mission.replay.records import ReplayedEstimate, ReplayedSetpoint
 
 PROFILE = "lineflight"
 
@@ -93,6 +94,8 @@ RECORD_CHANNELS = (
     RecordChannel("/mission/ended", MissionEnded, "how the flight ended", "once"),
     RecordChannel("/event", Event, "what happened and what was done about it", "on change"),
     RecordChannel("/status_text", StatusText, "the autopilot's own words", "on change"),
+    RecordChannel("/replayed/estimate", ReplayedEstimate, "what a reference replay saw", "only in a reference log"),
+    RecordChannel("/replayed/setpoint", ReplayedSetpoint, "where a reference replay went", "only in a reference log"),
     RecordChannel("/log/health", LogHealth, "how the log itself does", "1 Hz"),
     RecordChannel("/truth/pose", TruePose, "where a simulated vehicle truly was", "at most 20 Hz", 20.0),
     RecordChannel("/truth/line", TrueLine, "the simulated power line", "once"),

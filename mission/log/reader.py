@@ -41,6 +41,7 @@ from mission.records import (
     TrueLine,
     TruePose,
 )
+from mission.replay.records import ReplayedEstimate, ReplayedSetpoint
 from vision.records import VisionReport
 
 _IMPORTED = (ImportedState, ImportedSetpoint, ImportedActuators, ImportedPower, ImportedText, ImportedMode)
@@ -52,7 +53,8 @@ class Flight:
 
     `is_truncated` says that the log was never closed: the program or the computer died. `reports` carry their JPEGs
     only when the flight was read with images; `image_times_ns` tells of which frames the log has one. `imported` is the
-    autopilot's own log, where `lineflight import` has laid it beside ours; `end_ns` does not count it.
+    autopilot's own log, where `lineflight import` has laid it beside ours; `end_ns` does not count it. A reference log
+    also holds what a replay made of it (mission/replay).
     """
 
     path: Path
@@ -77,6 +79,8 @@ class Flight:
     attachments: dict[str, bytes]
     image_times_ns: frozenset[int]
     imported: Imported | None
+    reference_estimates: tuple[ReplayedEstimate, ...]
+    reference_setpoints: tuple[ReplayedSetpoint, ...]
     end_ns: int
     is_truncated: bool
 
@@ -218,6 +222,8 @@ def _flight(
         attachments=attachments,
         image_times_ns=frozenset(entry.t_ns for entry in streams[VisionEntry] if entry.has_image),
         imported=imported,
+        reference_estimates=tuple(streams[ReplayedEstimate]),
+        reference_setpoints=tuple(streams[ReplayedSetpoint]),
         end_ns=max([mission.start_ns, *times_ns]),
         is_truncated=is_truncated or (imported is not None and imported.log.was_cut_off),
     )

@@ -82,8 +82,8 @@ def replay_guidance(
     """What today's task would have sent at each tick that sent a setpoint.
 
     It starts from the flight's setpoint before the tick and its state then, and sees `reports`, in the order in which
-    they were told. Since each tick starts from where the flight was, a difference does not grow from tick to tick. Tasks that the
-    flight did not reach are not flown, searches and pauses are passed over. `plan` is what was flown.
+    they were told. Since each tick starts from where the flight was, a difference does not grow from tick to tick.
+    Tasks that the flight did not reach are not flown, searches and pauses are passed over. `plan` is what was flown.
     """
     if not flight.states or not flight.ticks:
         return

@@ -28,7 +28,7 @@ def write_copy(source: Path, out: Path, records: Iterable[tuple[int, object]], t
     Raises CopyError when it exists or cannot be written, LogError when `source` cannot be read.
     """
     if out.exists():
-        raise CopyError(f"{out} exists already; name another file by --out, or remove it.")
+        raise CopyError(f"{out} exists already; name another file, or remove it.")
     part = out.with_name(out.name + ".part")
     try:
         with part.open("xb") as file:
@@ -43,7 +43,7 @@ def write_copy(source: Path, out: Path, records: Iterable[tuple[int, object]], t
         raise CopyError(f"{part} is in the way, which an import left or still writes; remove it first.") from error
     except OSError as error:
         raise CopyError(
-            f"The log {out} cannot be written ({error.strerror or error}); name a place with room by --out."
+            f"The log {out} cannot be written ({error.strerror or error}); name a place with room."
         ) from error
 
 

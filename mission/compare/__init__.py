@@ -1,0 +1,1 @@
+"""Flights held against each other."""

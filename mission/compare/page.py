@@ -1,0 +1,60 @@
+"""Flights compared on one page: their tracks over each other, their legs beside each other, every figure."""
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from drivers.clock import NS_PER_S
+from mission.compare.comparison import Comparison
+from mission.log.blame.signals import lateral_of, motion_of
+from mission.log.page.curves import listed
+from mission.log.page.page import fill
+from mission.log.page.thinning import evenly
+from mission.log.reader import Flight
+from mission.log.summary import FOLLOW_TASK, task_spans
+
+_TRACK_POINTS = 2_000
+_LEG_POINTS = 1_000
+
+
+def comparison_page(comparison: Comparison, flights: Sequence[Flight]) -> str:
+    """The page as HTML; `flights` are those compared, in the same order."""
+    tracks, legs = [], [_legs(flight) for flight in flights]
+    for flight in flights:
+        states = [flight.states[k] for k in evenly(len(flight.states), _TRACK_POINTS).tolist()]
+        tracks.append({"north": [round(s.north_m, 3) for s in states], "east": [round(s.east_m, 3) for s in states]})
+    line = next((flight.line for flight in flights if flight.line is not None), None)
+    n_legs = max((len(of_flight) for of_flight in legs), default=0)
+    data: dict[str, Any] = comparison.to_json() | {
+        "names": list(comparison.names),
+        "tracks": tracks,
+        "conductors": [] if line is None else [[list(p) for p in conductor] for conductor in line.conductors_ned_m],
+        "legs": [
+            {
+                "title": f"Leg {k + 1}: off the line, by the time since the leg's start",
+                "curves": [
+                    {"flight": flight} | of_flight[k] for flight, of_flight in enumerate(legs) if k < len(of_flight)
+                ],
+            }
+            for k in range(n_legs)
+        ],
+    }
+    return fill("compare", "Flights compared", data)
+
+
+def _legs(flight: Flight) -> list[dict[str, Any]]:
+    """For each leg that follows the line: times since its start [s], and the way off the line [m]."""
+    if not flight.states:
+        return []
+    motion = motion_of(flight)
+    legs = []
+    for span in task_spans(flight):
+        if span.task != FOLLOW_TASK:
+            continue
+        part = motion.slice(span.start_ns, flight.end_ns if span.end_ns is None else span.end_ns)
+        off_m = lateral_of(flight, part).off_m
+        kept = evenly(len(part.t_ns), _LEG_POINTS)
+        t_s = np.asarray((part.t_ns[kept] - span.start_ns) / NS_PER_S)
+        legs.append({"t": listed(t_s), "y": listed(off_m[kept])})
+    return legs
