@@ -112,6 +112,7 @@ def replay(
         TextColumn("frame {task.completed} of {task.total}"),
         console=Console(stderr=True),
         transient=True,
+        disable=not sys.stderr.isatty(),
     )
     try:
         flight = read_flight(log)

@@ -1,0 +1,142 @@
+"""The golden flight, flown again: the regression test for every change of vision and guidance."""
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from mission.ending import EXIT_BAD_INPUT, EXIT_DIFFERENT, EXIT_FAILED_FILE
+from mission.log.reader import Flight, read_flight
+from mission.replay.differences import Tolerance, estimate_differences, setpoint_differences
+from mission.replay.replay import Replay, differences, replay, write_reference
+from tests.log.synthetic_flight import fly, write_log
+from tests.replay.golden import GOLDEN
+from tests.support.command_line import lineflight
+from vision.records import LineEstimate
+
+
+@pytest.fixture(scope="module")
+def golden() -> Flight:
+    return read_flight(GOLDEN)
+
+
+@pytest.fixture(scope="module")
+def replayed(golden: Flight) -> Replay:
+    return replay(golden)
+
+
+def test_today_the_golden_flight_is_what_it_was(golden: Flight, replayed: Replay) -> None:
+    found = differences(golden, replayed)
+    assert found.is_reference
+    assert found.estimates.n == len(golden.image_times_ns) > 50
+    assert found.setpoints.n > 300
+    assert found.beyond(Tolerance()) == ()
+
+
+def test_on_one_computer_two_replays_are_the_same_to_the_bit(golden: Flight, replayed: Replay) -> None:
+    again = replay(golden)
+    assert [report.estimate for report in again.reports] == [report.estimate for report in replayed.reports]
+    assert again.ticks == replayed.ticks
+
+
+def test_the_replay_is_near_to_what_was_flown(golden: Flight, replayed: Replay) -> None:
+    bare = replace(golden, reference_estimates=(), reference_setpoints=())
+    found = differences(bare, replayed)
+    assert not found.is_reference
+    assert found.setpoints.distance_m is not None
+    assert found.setpoints.distance_m.p95 < 0.02  # JPEG is what the frames have gone through since
+    assert found.estimates.angle_deg is not None
+    assert found.estimates.angle_deg.p95 < 0.1
+
+
+def test_vision_that_has_changed_is_told(golden: Flight, replayed: Replay) -> None:
+    turned = tuple(
+        report
+        if report.estimate is None
+        else replace(report, estimate=replace(report.estimate, angle_rad=report.estimate.angle_rad + 0.01))
+        for report in replayed.reports
+    )
+    (words,) = differences(golden, replace(replayed, reports=turned)).beyond(Tolerance())
+    assert "angles differ by up to 0.573 degrees" in words
+
+
+def estimate(angle_rad: float, offset_px: float) -> LineEstimate:
+    return LineEstimate(angle_rad, offset_px, 3, None, 1.0, 0)
+
+
+def test_a_line_seen_the_other_way_round_is_the_same_line() -> None:
+    found = estimate_differences({0: estimate(math.pi / 2, 7.0)}, {0: estimate(0.001 - math.pi / 2, -7.0)})
+    assert found.angle_deg is not None
+    assert found.angle_deg.max == pytest.approx(math.degrees(0.001))
+    assert found.offset_px is not None
+    assert found.offset_px.max == 0.0
+
+
+def test_lines_that_come_and_go_are_counted() -> None:
+    now = {0: estimate(0.0, 0.0), 1: None, 2: None, 3: estimate(0.0, 0.0)}
+    then = {0: None, 1: estimate(0.0, 0.0), 2: None, 4: None}
+    found = estimate_differences(now, then)
+    assert (found.n, found.n_same, found.n_only_now, found.n_only_then) == (3, 1, 1, 1)
+    assert found.angle_deg is None
+    assert setpoint_differences([]).distance_m is None
+
+
+def test_the_command_replays_and_says_so(tmp_path: Path) -> None:
+    ran = lineflight("replay", GOLDEN, "--json")
+    assert ran.code == 0, ran.err
+    assert json.loads(ran.out)["beyond"] == []
+    shown = lineflight("replay", GOLDEN)
+    assert "held against the reference in the log" in shown.out
+
+
+def test_the_command_ends_with_6_where_the_reference_is_another(replayed: Replay, tmp_path: Path) -> None:
+    reports = tuple(
+        replace(r, estimate=None if r.estimate is None else replace(r.estimate, offset_px=r.estimate.offset_px + 5.0))
+        for r in replayed.reports
+    )
+    bare = tmp_path / "bare.mcap"
+    strip_reference(GOLDEN, bare)
+    write_reference(read_flight(bare), Replay(reports, replayed.ticks), tmp_path / "moved.mcap", lambda _: None)
+    ran = lineflight("replay", tmp_path / "moved.mcap")
+    assert ran.code == EXIT_DIFFERENT
+    assert "offsets differ by up to 5 px" in ran.out
+
+
+def test_what_cannot_be_replayed_is_refused_in_a_sentence(tmp_path: Path) -> None:
+    write_log(tmp_path / "synthetic.mcap", list(fly()))
+    ran = lineflight("replay", tmp_path / "synthetic.mcap")
+    assert (ran.code, ran.err.count("\n")) == (EXIT_BAD_INPUT, 1)
+    assert "does not tell its camera" in ran.err
+    again = lineflight("replay", GOLDEN, "--write", tmp_path / "golden.mcap")
+    assert again.code == EXIT_BAD_INPUT
+    assert "holds a reference already" in again.err
+    bare = tmp_path / "bare.mcap"
+    strip_reference(GOLDEN, bare)
+    there = lineflight("replay", bare, "--write", bare)
+    assert there.code == EXIT_FAILED_FILE
+    assert "exists already" in there.err
+
+
+def strip_reference(log: Path, out: Path) -> None:
+    """A log without its reference."""
+    from mcap.reader import make_reader
+    from mcap.writer import Writer
+
+    with log.open("rb") as source, out.open("wb") as target:
+        reader, writer = make_reader(source), Writer(target)
+        writer.start("lineflight")
+        ids: dict[str, int] = {}
+        for schema, channel, message in reader.iter_messages():
+            if channel.topic.startswith("/replayed/"):
+                continue
+            if channel.topic not in ids:
+                schema_id = 0 if schema is None else writer.register_schema(schema.name, schema.encoding, schema.data)
+                ids[channel.topic] = writer.register_channel(channel.topic, channel.message_encoding, schema_id)
+            writer.add_message(ids[channel.topic], message.log_time, message.data, message.publish_time)
+        for attachment in reader.iter_attachments():
+            writer.add_attachment(
+                attachment.create_time, attachment.log_time, attachment.name, attachment.media_type, attachment.data
+            )
+        writer.finish()
