@@ -1,0 +1,164 @@
+"""The pages about flights in a real browser: nothing is missing, nothing is asked of a network, the cursor moves.
+
+Not collected with the others, since it needs Chromium: `make test-page` runs it. PAGE_SHOTS names a folder that keeps
+screenshots.
+"""
+
+import os
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+from mission.log.inspection import inspect_flight
+from mission.log.page.page import flight_page
+from mission.log.reader import Flight, read_flight
+from mission.plan_file import read_mission
+from mission.simulated.page_ground import page_ground
+from mission.simulated.scenario import Scenario
+from mission.simulated.virtual_flight import fly_virtually
+from tests.page_browser.browser import Browser
+from tests.support.command_line import ROOT, lineflight
+
+DESKTOP, PHONE = (1440, 1100), (500, 1100)  # the narrowest window that Chromium makes
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A flight from take-off to landing, in wind."""
+    mission = read_mission(ROOT / "missions" / "follow_line.yaml")
+    scenario = Scenario(seed=2, wind_m_s=8.0)
+    outcome, _ = fly_virtually(mission, scenario, tmp_path_factory.mktemp("logs"), lambda _: None, lambda _: None)
+    return outcome.log
+
+
+@pytest.fixture(scope="module")
+def flight(log: Path) -> Flight:
+    return read_flight(log)
+
+
+@pytest.fixture(scope="module")
+def page(flight: Flight, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("pages") / "flight.html"
+    path.write_text(flight_page(flight, inspect_flight(flight), page_ground(flight, "medium_voltage", None)))
+    return path
+
+
+@pytest.fixture(params=[DESKTOP, PHONE], ids=["desktop", "phone"])
+def browser(request: pytest.FixtureRequest) -> Iterator[Browser]:
+    with Browser(*request.param) as browser:
+        yield browser
+
+
+def keep(browser: Browser, name: str) -> None:
+    if "PAGE_SHOTS" in os.environ:
+        browser.screenshot(Path(os.environ["PAGE_SHOTS"]) / f"{name}.png")
+
+
+def draw_all(browser: Browser) -> None:
+    """Scroll past every chart, since those out of sight are drawn when they come near."""
+    browser.evaluate(
+        """(async () => {
+          for (let y = 0; y < document.body.scrollHeight; y += 400) {
+            scrollTo(0, y);
+            await new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(done)));
+          }
+          scrollTo(0, 0);
+        })()"""
+    )
+    browser.wait_for(
+        "[...document.querySelectorAll('#charts .plot, #histograms .plot')].every((plot) => plot._fullLayout)"
+    )
+
+
+def test_the_page_is_whole_and_asks_nothing_of_a_network(browser: Browser, page: Path) -> None:
+    browser.open(page)
+    draw_all(browser)
+    browser.evaluate("document.querySelector('[data-view=space]').click()")
+    browser.wait_for("document.getElementById('space')._fullLayout !== undefined")
+    keep(browser, f"space-{browser.evaluate('innerWidth')}")
+    assert browser.page.errors == []
+    asked = [url for url in browser.page.requests if not url.startswith(("data:", "blob:"))]
+    assert asked == [page.resolve().as_uri()]
+    assert browser.evaluate("document.documentElement.scrollWidth <= innerWidth"), "it is wider than the window"
+
+
+def test_the_plots_have_their_traces(browser: Browser, page: Path, flight: Flight) -> None:
+    browser.open(page)
+    draw_all(browser)
+    names = browser.evaluate("document.getElementById('map').data.map((trace) => trace.name)")
+    tasks = [started.task.replace("_", " ") for started in flight.tasks_started]
+    assert [name for name in names if name in tasks] == tasks
+    assert {"conductor", "supports", "line as known", "setpoint", "true way"} <= set(names)
+    curves = browser.evaluate("[...document.querySelectorAll('#charts .plot')].map((p) => p.data.map((t) => t.name))")
+    assert [
+        "off the line",
+        "the line elsewhere than told",
+        "setpoint off the line as told",
+        "vehicle off its setpoint",
+    ] in curves
+    assert ["angle"] in curves
+    assert ["offset"] in curves
+    assert any({"setpoint", "vehicle", "over the conductors, true"} <= set(chart) for chart in curves)
+    assert ["battery"] in curves
+    points = browser.evaluate(
+        "Math.min(...[...document.querySelectorAll('#charts .plot')]"
+        ".flatMap((p) => p.data.map((t) => t.y.filter((v) => v !== null).length)))"
+    )
+    assert points > 10
+    bars = browser.evaluate("document.querySelectorAll('#histograms .plot').length")
+    assert bars >= 4
+    assert browser.evaluate("document.querySelectorAll('#tasks .task').length") == len(tasks)
+    keep(browser, f"page-{browser.evaluate('innerWidth')}")
+
+
+def test_the_slider_moves_everything(browser: Browser, page: Path, flight: Flight) -> None:
+    browser.open(page)
+    draw_all(browser)
+
+    def slide_to(t_s: float) -> tuple[int, str, str, str, str, int]:
+        browser.evaluate(
+            f"(() => {{ const s = document.getElementById('slider'); s.value = {t_s}; "
+            "s.dispatchEvent(new Event('input')); })()"
+        )
+        browser.wait_for("document.getElementById('frame').complete")
+        frame, clock, arrow, cursor, source = browser.evaluate(
+            "[lineflight.frame, document.getElementById('clock').textContent, "
+            "document.getElementById('arrow').style.transform, document.querySelector('.cursor').style.left, "
+            "document.getElementById('frame').src.slice(-200)]"
+        )
+        return frame, clock, arrow, cursor, source, browser.evaluate("document.querySelectorAll('#lines line').length")
+
+    follow = next(started for started in flight.tasks_started if started.task == "follow_lines")
+    start_s = (follow.t_ns - flight.tasks_started[0].t_ns) / 1e9
+    one, other = slide_to(start_s + 2.0), slide_to(start_s + 9.0)
+    for before, after in zip(one[:5], other[:5], strict=True):
+        assert before != after
+    minutes, seconds = divmod(start_s + 9.0, 60.0)
+    assert other[1] == f"{minutes:.0f}:{seconds:04.1f}"
+    assert other[5] > 0, "no line is drawn on the frame"
+    assert browser.evaluate("document.getElementById('frame').naturalWidth") > 0
+    keep(browser, f"slid-{browser.evaluate('innerWidth')}")
+
+
+def test_the_comparison_page_is_whole(browser: Browser, log: Path, tmp_path: Path) -> None:
+    page = tmp_path / "compared.html"
+    ran = lineflight("compare", log, log, "--html", page)
+    assert ran.code == 0, ran.err
+    browser.open(page)
+    assert browser.page.errors == []
+    asked = [url for url in browser.page.requests if not url.startswith(("data:", "blob:"))]
+    assert asked == [page.resolve().as_uri()]
+    assert browser.evaluate("document.querySelectorAll('#charts .plot').length") == 2
+    assert (
+        browser.evaluate("document.getElementById('map').data.filter((t) => t.name.startsWith('follow')).length") == 2
+    )
+    keep(browser, f"compared-{browser.evaluate('innerWidth')}")
+
+
+def test_it_is_dark_where_people_want_it_dark(page: Path) -> None:
+    with Browser(*DESKTOP, is_dark=True) as browser:
+        browser.open(page)
+        draw_all(browser)
+        assert browser.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(18, 22, 27)"
+        keep(browser, "dark")
