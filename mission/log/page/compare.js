@@ -61,13 +61,15 @@
       xaxis: axis({ title: { text: "east [m]" }, range: [box[0] - pad, box[1] + pad] }),
       yaxis: axis({ title: { text: "north [m]" }, range: [box[2] - pad, box[3] + pad], scaleanchor: "x" }), dragmode: "pan", hovermode: "closest",
     }), { ...CONFIG, scrollZoom: true });
+    const draws = [];
     for (const leg of data.legs) {
       const card = make("div", undefined, "card chart"), plot = make("div", undefined, "plot");
       card.append(make("h2", `${leg.title} [m]`), plot);
       $("charts").append(card);
-      Plotly.newPlot(plot, leg.curves.map((curve) => ({ type: "scatter", mode: "lines", name: data.names[curve.flight], x: curve.t, y: curve.y, line: { color: paint(curve.flight), width: 1.5 } })),
-        layout({ xaxis: axis({ ticksuffix: " s" }), yaxis: axis({}), hovermode: "x" }), CONFIG);
+      draws.push(() => Plotly.newPlot(plot, leg.curves.map((curve) => ({ type: "scatter", mode: "lines", name: data.names[curve.flight], x: curve.t, y: curve.y, line: { color: paint(curve.flight), width: 1.5 } })),
+        layout({ xaxis: axis({ ticksuffix: " s" }), yaxis: axis({}), hovermode: "x" }), CONFIG));
     }
+    for (const draw of draws) draw(); // once all cards stand, and have their widths
     document.body.dataset.ready = "yes";
   });
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => location.reload());

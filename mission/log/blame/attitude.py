@@ -1,0 +1,92 @@
+"""Excursions of a leg in height and heading."""
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.clock import NS_PER_S
+from mission.log.blame.leg import Leg
+from mission.log.blame.records import Culprit, Excursion, Fault, Kind, Limits
+from mission.log.blame.signals import Motion
+from mission.log.blame.spans import spans
+from mission.log.blame.tracking import TILT_LIMIT_RAD
+
+Floats = NDArray[np.float64]
+
+_STILL_RAD, _STILL_S = math.radians(2.0), 2.0  # a setpoint whose yaw moves by less within this time stands still
+
+
+def off_height(leg: Leg, limits: Limits) -> Iterator[Excursion]:
+    """Where the vehicle was above or below its setpoint."""
+    motion = leg.motion
+    below_m = np.where(leg.is_flown, np.nan_to_num(motion.position_m[:, 2] - motion.setpoint_m[:, 2]), 0.0)
+    for start_ns, end_ns in spans(motion.t_ns, np.abs(below_m) > limits.off_height_m, limits.least_s):
+        inside = np.flatnonzero((motion.t_ns >= start_ns) & (motion.t_ns <= end_ns))
+        peak = int(inside[np.abs(below_m[inside]).argmax()])
+        tilt_rad = float(motion.tilt_rad[inside].max())
+        is_tilted = tilt_rad > TILT_LIMIT_RAD
+        words = [f"{abs(below_m[peak]):.2f} m {'below' if below_m[peak] > 0 else 'above'} its setpoint"]
+        if is_tilted:
+            words.append(
+                f"it was tilted by {math.degrees(tilt_rad):.0f} degrees against the wind, and its thrust had to do both"
+            )
+        yield Excursion(
+            Kind.OFF_HEIGHT,
+            leg.task,
+            start_ns,
+            end_ns,
+            float(abs(below_m[peak])),
+            "m",
+            Culprit.WIND if is_tilted else Culprit.AUTOPILOT,
+            Fault.PUSHED if is_tilted else Fault.TRACKING,
+            {},
+            tuple(words),
+        )
+
+
+def off_heading(leg: Leg, limits: Limits) -> Iterator[Excursion]:
+    """Where the vehicle's nose turned away from a setpoint that stood still."""
+    motion = leg.motion
+    off_rad = _wrapped(motion.yaw_rad - motion.setpoint_yaw_rad)
+    is_still = _is_still(motion, leg.start_ns)
+    is_beyond = (np.abs(np.nan_to_num(off_rad)) > limits.off_heading_rad) & is_still & leg.is_flown
+    for start_ns, end_ns in spans(motion.t_ns, is_beyond, limits.least_s):
+        inside = np.flatnonzero((motion.t_ns >= start_ns) & (motion.t_ns <= end_ns) & is_beyond)
+        peak = int(inside[np.abs(off_rad[inside]).argmax()])
+        nearby = (motion.t_ns >= start_ns - NS_PER_S) & (motion.t_ns <= end_ns)
+        sunk_m = float(np.nan_to_num(motion.position_m[nearby, 2] - motion.setpoint_m[nearby, 2]).max())
+        side = "right" if off_rad[peak] > 0 else "left"
+        words = [
+            f"the nose turned {math.degrees(abs(off_rad[peak])):.0f} degrees to the {side} while its "
+            "setpoint stood still: air alone hardly turns a multirotor"
+        ]
+        if sunk_m > 0.15:
+            words.append(
+                f"it sank {sunk_m:.2f} m meanwhile, as one does whose rotors do not give what is asked of them"
+            )
+        yield Excursion(
+            Kind.OFF_HEADING,
+            leg.task,
+            start_ns,
+            end_ns,
+            float(math.degrees(abs(off_rad[peak]))),
+            "deg",
+            Culprit.AUTOPILOT,
+            Fault.TRACKING,
+            {},
+            tuple(words),
+        )
+
+
+def _is_still(motion: Motion, start_ns: int) -> NDArray[np.bool_]:
+    """Where the setpoint's yaw has hardly moved for a while; not at the leg's beginning, which may follow a turn."""
+    then_ns = motion.t_ns - round(_STILL_S * NS_PER_S)
+    before = np.searchsorted(motion.t_ns, then_ns)
+    moved_rad = np.abs(_wrapped(motion.setpoint_yaw_rad - motion.setpoint_yaw_rad[before]))
+    return np.asarray((np.nan_to_num(moved_rad, nan=np.inf) < _STILL_RAD) & (then_ns >= start_ns))
+
+
+def _wrapped(angles_rad: Floats) -> Floats:
+    return np.asarray(np.remainder(angles_rad + np.pi, 2 * np.pi) - np.pi)

@@ -1,0 +1,104 @@
+"""Excursions of a leg in what concerns the line: off it, without it, with frames of wrong times."""
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.clock import NS_PER_S
+from mission.log.blame.leg import Leg
+from mission.log.blame.perception import lag_words, lateness, of_perception, of_unseen
+from mission.log.blame.records import Culprit, Excursion, Fault, Kind, Limits
+from mission.log.blame.spans import spans
+from mission.log.blame.tracking import of_tracking
+
+Floats = NDArray[np.float64]
+
+
+def off_line(leg: Leg, limits: Limits) -> Iterator[Excursion]:
+    """Where the vehicle flew beside the line."""
+    lateral = leg.lateral
+    off_m = np.where(leg.is_flown, np.nan_to_num(lateral.off_m), 0.0)
+    for start_ns, end_ns in spans(lateral.t_ns, np.abs(off_m) > limits.off_line_m, limits.least_s):
+        is_in = (lateral.t_ns >= start_ns) & (lateral.t_ns <= end_ns)
+        inside = np.flatnonzero(is_in)
+        peak = int(inside[np.abs(off_m[inside]).argmax()])
+        side = math.copysign(1.0, off_m[peak])
+        beyond = inside[side * off_m[inside] > limits.off_line_m]
+        shares = {
+            "perception": _mean(side * lateral.perception_m[beyond]),
+            "executive": _mean(side * lateral.executive_m[beyond]),
+            "tracking": _mean(side * lateral.tracking_m[beyond]),
+        }
+        largest = max(shares, key=lambda name: shares[name])
+        if largest == "perception" or not math.isfinite(shares["tracking"]):
+            culprit, fault, evidence = of_perception(leg, start_ns, end_ns, beyond)
+        elif largest == "executive":
+            culprit, fault, evidence = _of_executive(leg, start_ns, end_ns, shares["executive"])
+        else:
+            culprit, fault, evidence = of_tracking(leg.motion, lateral, peak, side)
+        words = "right" if side > 0 else "left"
+        known = "" if lateral.is_true else " as it was known"
+        first = (
+            f"{abs(off_m[peak]):.2f} m to the {words} of the line{known}; of the "
+            f"mean beyond the limit the line as told was {shares['perception']:+.2f} m, the setpoint "
+            f"{shares['executive']:+.2f} m, the vehicle's way off its setpoint {shares['tracking']:+.2f} m"
+        )
+        yield Excursion(
+            Kind.OFF_LINE,
+            leg.task,
+            start_ns,
+            end_ns,
+            float(abs(off_m[peak])),
+            "m",
+            culprit,
+            fault,
+            {name: round(value, 3) for name, value in shares.items() if math.isfinite(value)},
+            (first, *evidence),
+        )
+
+
+def _of_executive(leg: Leg, start_ns: int, end_ns: int, share_m: float) -> tuple[Culprit, Fault, tuple[str, ...]]:
+    """A setpoint off the line as told: the law's own doing, unless what it was told came late."""
+    late = lateness(leg, start_ns, end_ns)
+    if late is not None:
+        return Culprit.PERCEPTION, Fault.LATE, (late,)
+    words = f"the setpoint ran {share_m:.2f} m beside the line as it was known then, which the vehicle followed"
+    return Culprit.EXECUTIVE, Fault.SETPOINT, (words,)
+
+
+def unseen(leg: Leg, limits: Limits) -> Iterator[Excursion]:
+    """Where nothing told of the line for too long."""
+    lateral = leg.lateral
+    # What was told before the leg does not count as seen within it, and nothing at all is unseen.
+    since_s = (lateral.t_ns - leg.start_ns) / NS_PER_S
+    age_s = np.where(np.isfinite(lateral.age_s), np.minimum(lateral.age_s, since_s), since_s)
+    for first_ns, end_ns in spans(lateral.t_ns, age_s > limits.unseen_s, 0.0):
+        inside = (lateral.t_ns >= first_ns) & (lateral.t_ns <= end_ns)
+        peak_s = float(age_s[inside].max())
+        start_ns = max(leg.start_ns, first_ns - round(limits.unseen_s * NS_PER_S))
+        culprit, fault, evidence = of_unseen(leg, start_ns, end_ns)
+        told = f"for {peak_s:.1f} s nothing told where the line was"
+        yield Excursion(Kind.UNSEEN, leg.task, start_ns, end_ns, peak_s, "s", culprit, fault, {}, (told, *evidence))
+
+
+def misdated(leg: Leg, limits: Limits) -> Iterator[Excursion]:
+    """A leg whose frames bear other times than those at which they were taken."""
+    if leg.lag is not None and leg.lag.lag_s > limits.misdated_s:
+        yield Excursion(
+            Kind.MISDATED,
+            leg.task,
+            leg.start_ns,
+            leg.end_ns,
+            leg.lag.lag_s,
+            "s",
+            Culprit.PERCEPTION,
+            Fault.LATE,
+            {},
+            (lag_words(leg.lag),),
+        )
+
+
+def _mean(values: Floats) -> float:
+    return float(np.mean(values)) if values.size else math.nan

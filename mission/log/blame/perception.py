@@ -1,0 +1,97 @@
+"""What perception told of the line: wrong, late, or not at all."""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+from drivers.clock import NS_PER_S
+from mission.log.blame.lag import ImageLag
+from mission.log.blame.leg import Leg
+from mission.log.blame.records import Culprit, Fault
+from mission.log.blame.tracking import of_tracking
+
+_OLD_S = 0.3  # latency over which an estimate is late
+_GONE_SHARE = 0.5  # of an excursion, without news of the line
+_NEWS_S = 0.5
+_VIEW_SHARE = 0.85  # of half the picture's width: further out a line is too short to be found
+_OUT_OF_VIEW_SHARE = 0.3  # of the time unseen, in which the line was out of the picture
+
+
+def lateness(leg: Leg, start_ns: int, end_ns: int) -> str | None:
+    """How what was told between two times was late, in a sentence; None where it was not."""
+    return _latency(leg, start_ns, end_ns) if leg.lag is None else lag_words(leg.lag)
+
+
+def lag_words(lag: ImageLag) -> str:
+    """What wrong times show in, in a sentence."""
+    return (
+        f"frames show where the vehicle was {lag.lag_s * 1e3:.0f} ms before the time that they bear: with that the "
+        f"line scatters by {100 * lag.residual:.0f} % of what it does without"
+    )
+
+
+def of_perception(
+    leg: Leg, start_ns: int, end_ns: int, beyond: NDArray[np.intp]
+) -> tuple[Culprit, Fault, tuple[str, ...]]:
+    """The line was elsewhere than told, at the samples `beyond` the limit: late, missing, or wrong."""
+    lateral = leg.lateral
+    age_s = lateral.age_s[beyond]
+    late = lateness(leg, start_ns, end_ns)
+    if late is not None:
+        return Culprit.PERCEPTION, Fault.LATE, (late,)
+    if not np.isfinite(age_s).any() or float((~(age_s <= _NEWS_S)).mean()) > _GONE_SHARE:
+        return Culprit.PERCEPTION, Fault.MISSING, _unseen_words(leg, start_ns, end_ns)
+    error_m = lateral.perception_m[beyond]
+    middle_m = float(np.nanmedian(error_m))
+    spread_m = float(np.nanpercentile(np.abs(error_m - middle_m), 90))
+    side = "left" if middle_m > 0 else "right"
+    words = [f"the line was {abs(middle_m):.2f} m to the {side} of where it was told, within {spread_m:.2f} m"]
+    whole_m = lateral.perception_m[leg.is_flown & np.isfinite(lateral.perception_m)]
+    bias_m = float(np.median(whole_m))
+    if leg.depth_m is not None and abs(bias_m) > 0.5 * abs(middle_m):
+        degrees = math.degrees(math.atan2(abs(bias_m), leg.depth_m))
+        words.append(
+            f"it is so over the whole leg ({abs(bias_m):.2f} m in the median), as if the camera were mounted or "
+            f"calibrated {degrees:.1f} degrees askew"
+        )
+    return Culprit.PERCEPTION, Fault.WRONG, tuple(words)
+
+
+def of_unseen(leg: Leg, start_ns: int, end_ns: int) -> tuple[Culprit, Fault, tuple[str, ...]]:
+    """Late, out of the picture because of how the vehicle was tilted and where it was, or not found."""
+    late = _latency(leg, start_ns, end_ns)
+    if late is not None:
+        return Culprit.PERCEPTION, Fault.LATE, (late,)
+    inside = np.flatnonzero((leg.lateral.t_ns >= start_ns) & (leg.lateral.t_ns <= end_ns))
+    if leg.view is not None and float((leg.view[inside] > _VIEW_SHARE).mean()) > _OUT_OF_VIEW_SHARE:
+        tracking_m = np.nan_to_num(leg.lateral.tracking_m[inside])
+        peak = int(inside[np.abs(tracking_m).argmax()])
+        side = math.copysign(1.0, leg.lateral.tracking_m[peak])
+        culprit, fault, evidence = of_tracking(leg.motion, leg.lateral, peak, side)
+        return culprit, fault, ("the vehicle was so far aside and so tilted that the line left the picture", *evidence)
+    return Culprit.PERCEPTION, Fault.MISSING, _unseen_words(leg, start_ns, end_ns)
+
+
+def _unseen_words(leg: Leg, start_ns: int, end_ns: int) -> tuple[str, ...]:
+    """Why there was no line: no frames, frames that cannot be looked at, frames without it, or with another one."""
+    reports = [report for report in leg.reports if start_ns <= report.t_capture_ns <= end_ns]
+    if not reports:
+        return ("no frame came through vision",)
+    troubles = [str(report.trouble) for report in reports if report.trouble is not None]
+    n_seen = sum(report.estimate is not None for report in reports)
+    words = [f"{n_seen} of {len(reports)} frames showed a line"]
+    if troubles:
+        words.append(f"{len(troubles)} frames were {max(set(troubles), key=troubles.count)}")
+    if n_seen > 0.5 * len(reports):
+        words.append("what they showed could not be the line that was followed")
+    return tuple(words)
+
+
+def _latency(leg: Leg, start_ns: int, end_ns: int) -> str | None:
+    """How old estimates were when they came, in a sentence; None where they were fresh."""
+    values_ns = [report.latency_ns for report in leg.reports if start_ns <= report.t_capture_ns <= end_ns]
+    latency_s = float(np.median(values_ns)) / NS_PER_S if values_ns else 0.0
+    if latency_s <= _OLD_S:
+        return None
+    return f"estimates came {latency_s * 1e3:.0f} ms after their frames were taken (median)"
