@@ -6,7 +6,7 @@ MISSION ?= missions/follow_line.yaml
 FLY ?= --speed 1.5
 PYTEST ?=
 
-.PHONY: fly test test-v4l2 check bench bench-vision bench-jitter bench-soak bench-following bench-rendered world-pictures schema diagram safety-table clean clean-v4l2
+.PHONY: fly test test-v4l2 test-page golden check bench bench-inspection bench-vision bench-jitter bench-soak bench-following bench-rendered world-pictures schema diagram safety-table clean clean-v4l2
 
 fly: $(VENV)/.installed
 	$(BIN)/lineflight dry-run $(MISSION) $(FLY)
@@ -18,6 +18,12 @@ test: $(VENV)/.installed-dev
 
 test-v4l2: $(VENV)/.installed-dev
 	$(BIN)/python -m tests.v4l2_guest.boot $(PYTEST)
+
+test-page: $(VENV)/.installed-dev
+	$(BIN)/python -m tests.page_browser $(PYTEST)
+
+golden: $(VENV)/.installed-dev
+	$(BIN)/python -m tests.replay.golden
 
 check: $(VENV)/.installed-dev
 	$(BIN)/ruff check .
@@ -42,6 +48,9 @@ bench-jitter: $(VENV)/.installed-dev
 
 bench-soak: $(VENV)/.installed-dev
 	$(BIN)/python -m benchmarks.soak
+
+bench-inspection: $(VENV)/.installed-dev
+	$(BIN)/python -m benchmarks.inspection
 
 bench-following: $(VENV)/.installed-dev
 	$(BIN)/python -m benchmarks.following

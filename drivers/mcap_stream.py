@@ -5,9 +5,11 @@ import struct
 from collections.abc import Iterator
 from typing import TYPE_CHECKING, BinaryIO, cast
 
+from mcap.data_stream import ReadDataStream
 from mcap.exceptions import EndOfFile
-from mcap.records import Attachment, Channel, McapRecord, Message
-from mcap.stream_reader import StreamReader
+from mcap.opcode import Opcode
+from mcap.records import Attachment, Channel, Chunk, McapRecord, Message
+from mcap.stream_reader import StreamReader, get_chunk_data_stream
 
 if TYPE_CHECKING:
     from typing_extensions import Buffer
@@ -19,6 +21,8 @@ IMAGE_DATA_FIELD = 2
 """The field of foxglove.CompressedImage (protobuf) that holds the JPEG."""
 
 _RECORD_HEADER = struct.Struct("<BQ")  # opcode, length of what follows [bytes]
+_MESSAGE_HEAD = struct.Struct("<H4xQ")  # channel, sequence number (passed over), log time
+_MESSAGE_HEAD_BYTES = 22  # the publish time stands behind them
 _FOOTER_OPCODE = 0x02
 _VARINT, _BYTES = 0, 2  # protobuf's wire types
 _FIXED_BYTES = {1: 8, 5: 4}
@@ -47,13 +51,35 @@ def whole_records(file: BinaryIO) -> tuple[int, bool]:
 def messages(stream: BinaryIO, attachments: dict[str, bytes] | None = None) -> Iterator[tuple[str, int, bytes]]:
     """Topic, log time [ns, Unix] and body of each message, in the order written; fills `attachments` by name."""
     topics: dict[int, str] = {}
-    for record in _records(stream):
-        if isinstance(record, Channel):
+    for record in _records(stream, emit_chunks=True):
+        if isinstance(record, Chunk):
+            yield from _messages_in(record, topics)
+        elif isinstance(record, Channel):
             topics[record.id] = record.topic
         elif isinstance(record, Message):
             yield topics[record.channel_id], record.log_time, record.data
         elif isinstance(record, Attachment) and attachments is not None:
             attachments[record.name] = record.data
+
+
+def _messages_in(chunk: Chunk, topics: dict[int, str]) -> Iterator[tuple[str, int, bytes]]:
+    """A chunk's messages; its channels join `topics`.
+
+    The library takes each field through its own stream, which for a long log is most of the time that reading takes.
+    """
+    unpacked, n_bytes = get_chunk_data_stream(chunk, validate_crc=True)
+    data = unpacked.read(n_bytes)
+    at = 0
+    while at < n_bytes:
+        opcode, length = _RECORD_HEADER.unpack_from(data, at)
+        at += _RECORD_HEADER.size
+        if opcode == Opcode.MESSAGE:
+            channel_id, log_time_ns = _MESSAGE_HEAD.unpack_from(data, at)
+            yield topics[channel_id], log_time_ns, data[at + _MESSAGE_HEAD_BYTES : at + length]
+        elif opcode == Opcode.CHANNEL:
+            channel = Channel.read(ReadDataStream(io.BytesIO(data[at : at + length])))
+            topics[channel.id] = channel.topic
+        at += length
 
 
 def open_messages(file: BinaryIO, attachments: dict[str, bytes] | None = None) -> Iterator[tuple[str, int, bytes]]:
@@ -66,9 +92,9 @@ def open_records(file: BinaryIO) -> Iterator[McapRecord]:
     return _records(_whole(file))
 
 
-def _records(stream: BinaryIO) -> Iterator[McapRecord]:
+def _records(stream: BinaryIO, *, emit_chunks: bool = False) -> Iterator[McapRecord]:
     try:
-        yield from StreamReader(stream, validate_crcs=True, record_size_limit=None).records
+        yield from StreamReader(stream, emit_chunks=emit_chunks, validate_crcs=True, record_size_limit=None).records
     except EndOfFile:
         # The stream holds whole records only: this is the end of a log that was never closed.
         return

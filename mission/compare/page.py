@@ -7,7 +7,7 @@ import numpy as np
 
 from drivers.clock import NS_PER_S
 from mission.compare.comparison import Comparison
-from mission.log.blame.signals import lateral_of, motion_of
+from mission.log.blame.signals import knowledge_of, lateral_of, motion_of
 from mission.log.page.curves import listed
 from mission.log.page.page import fill
 from mission.log.page.thinning import evenly
@@ -47,13 +47,13 @@ def _legs(flight: Flight) -> list[dict[str, Any]]:
     """For each leg that follows the line: times since its start [s], and the way off the line [m]."""
     if not flight.states:
         return []
-    motion = motion_of(flight)
+    motion, known = motion_of(flight), knowledge_of(flight)
     legs = []
     for span in task_spans(flight):
         if span.task != FOLLOW_TASK:
             continue
         part = motion.slice(span.start_ns, flight.end_ns if span.end_ns is None else span.end_ns)
-        off_m = lateral_of(flight, part).off_m
+        off_m = lateral_of(known, part).off_m
         kept = evenly(len(part.t_ns), _LEG_POINTS)
         t_s = np.asarray((part.t_ns[kept] - span.start_ns) / NS_PER_S)
         legs.append({"t": listed(t_s), "y": listed(off_m[kept])})

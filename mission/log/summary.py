@@ -251,11 +251,12 @@ def _preflight(flight: Flight) -> PreflightSummary:
 def _legs(flight: Flight, following: list[tuple[int, int]]) -> tuple[LegSummary, ...]:
     # Telemetry that the control loop saw twice is one position.
     positions = {state.t_ns: (state.north_m, state.east_m, state.down_m) for state in flight.states}
+    t_ns, positions_m = np.array(list(positions), dtype=np.int64), np.array(list(positions.values()))
     legs = []
     for start_ns, end_ns in following:
-        leg = [position for t_ns, position in positions.items() if start_ns <= t_ns <= end_ns]
+        leg = positions_m[(t_ns >= start_ns) & (t_ns <= end_ns)]
         if len(leg) >= 2:
-            distances_m = line_fit_distances_m(np.array(leg))
+            distances_m = line_fit_distances_m(leg)
             # Equation 6.5 as printed lacks its 1/N; the figures of table 6.2 are means.
             legs.append(LegSummary(FOLLOW_TASK, len(leg), float(distances_m.mean()), _percentile(distances_m, 95)))
     return tuple(legs)

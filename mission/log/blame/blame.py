@@ -9,7 +9,7 @@ from mission.log.blame.attitude import off_heading, off_height
 from mission.log.blame.leg import leg_of
 from mission.log.blame.line import misdated, off_line, unseen
 from mission.log.blame.records import Excursion, Limits
-from mission.log.blame.signals import motion_of
+from mission.log.blame.signals import knowledge_of, motion_of
 from mission.log.reader import Flight
 from mission.log.summary import FOLLOW_TASK, task_spans
 
@@ -20,12 +20,12 @@ def find_excursions(flight: Flight, limits: Limits = DEFAULT_LIMITS) -> tuple[Ex
     """All excursions of a flight while it followed its line, in the order of their times."""
     if not flight.states:
         return ()
-    whole = motion_of(flight)
+    whole, known = motion_of(flight), knowledge_of(flight)
     found: list[Excursion] = []
     for span in task_spans(flight):
         if span.task != FOLLOW_TASK:
             continue
-        leg = leg_of(flight, whole, span)
+        leg = leg_of(flight, whole, known, span)
         if leg.is_flown.sum() >= 2:
             finders = (off_line, unseen, misdated) if flight.fixes or not leg.has_estimates else ()
             for find in (*finders, off_height, off_heading):

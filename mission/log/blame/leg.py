@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 from drivers.camera.camera import Intrinsics
 from drivers.clock import NS_PER_S
 from mission.log.blame.lag import ImageLag, image_lag, line_slope
-from mission.log.blame.signals import Lateral, Motion, lateral_of
+from mission.log.blame.signals import Knowledge, Lateral, Motion, lateral_of
 from mission.log.reader import Flight
 from mission.log.summary import TaskSpan
 from vision.records import VisionReport
@@ -48,11 +48,11 @@ class Leg:
         return any(report.estimate is not None for report in self.reports)
 
 
-def leg_of(flight: Flight, whole: Motion, span: TaskSpan) -> Leg:
-    """Cut a span out of a flight, whose motion is `whole`."""
+def leg_of(flight: Flight, whole: Motion, known: Knowledge, span: TaskSpan) -> Leg:
+    """Cut a span out of a flight, whose motion is `whole`, and in which was `known` what is."""
     end_ns = flight.end_ns if span.end_ns is None else span.end_ns
     motion = whole.slice(span.start_ns - round(GROWTH_S * NS_PER_S), end_ns)
-    lateral = lateral_of(flight, motion)
+    lateral = lateral_of(known, motion)
     is_flown = motion.t_ns >= span.start_ns
     reports = tuple(report for report in flight.reports if span.start_ns <= report.t_capture_ns <= end_ns)
     depths_m = [fix.depth_m for fix in flight.fixes if span.start_ns <= fix.t_ns <= end_ns and fix.depth_m is not None]

@@ -129,29 +129,56 @@ class Lateral:
     is_true: bool
 
 
-def lateral_of(flight: Flight, motion: Motion) -> Lateral:
-    """Divide the way off the line, at the times of `motion`, among those who made it."""
-    t_ns, n = motion.t_ns, len(motion.t_ns)
+@dataclass(frozen=True, slots=True, eq=False)
+class Knowledge:
+    """What was told of the line over a flight, and what was true: arrays that every leg looks into.
+
+    `told` (m, 4) holds north, east [m], heading [rad] and capture time [ns] of each place that was told, at `told_ns`
+    (m,). `truth_ns` (k,) and `truth_ne_m` (k, 2) are where the vehicle truly was, `axis_ne_m` the true line; None where
+    nobody knows it.
+    """
+
+    told_ns: Times
+    told: Floats
+    truth_ns: Times
+    truth_ne_m: Floats
+    axis_ne_m: Floats | None
+
+
+def knowledge_of(flight: Flight) -> Knowledge:
+    """What a flight's log holds about the line."""
     latency_ns = {report.t_capture_ns: report.latency_ns for report in flight.reports}
     fixes = [fix for fix in flight.fixes if fix.is_placed]
     told_ns = np.array([fix.t_ns + latency_ns.get(fix.t_ns, 0) for fix in fixes], dtype=np.int64)
     told = np.array([(f.north_m, f.east_m, f.heading_rad, f.t_ns) for f in fixes], dtype=np.float64).reshape(-1, 4)
     order = np.argsort(told_ns, kind="stable")
-    line = held_at(t_ns, told_ns[order], told[order], longest_s=np.inf)
+    is_known = flight.line is not None and len(flight.line.axis_ne_m) >= 2 and len(flight.truth) >= 2
+    return Knowledge(
+        told_ns=told_ns[order],
+        told=told[order],
+        truth_ns=np.array([pose.t_ns for pose in flight.truth], dtype=np.int64),
+        truth_ne_m=np.array([(pose.north_m, pose.east_m) for pose in flight.truth], dtype=np.float64).reshape(-1, 2),
+        axis_ne_m=true_axis(flight.line) if is_known and flight.line is not None else None,
+    )
+
+
+def lateral_of(known: Knowledge, motion: Motion) -> Lateral:
+    """Divide the way off the line, at the times of `motion`, among those who made it."""
+    t_ns, n = motion.t_ns, len(motion.t_ns)
+    line = held_at(t_ns, known.told_ns, known.told, longest_s=np.inf)
     age_s = (t_ns - line[:, 3]) / NS_PER_S
     line_along = np.where(np.cos(line[:, 2] - motion.yaw_rad) < 0.0, line[:, 2] + np.pi, line[:, 2])
     right = np.stack([-np.sin(line_along), np.cos(line_along)], axis=1)
     believed_m = ((motion.position_m[:, :2] - line[:, :2]) * right).sum(axis=1)
     tracking_m = ((motion.position_m - motion.setpoint_m)[:, :2] * right).sum(axis=1)
-    true_m = _true_off_m(flight, motion)
-    off_m = believed_m if true_m is None else true_m
+    true_m = _true_off_m(known, motion)
     return Lateral(
         t_ns=t_ns,
-        off_m=off_m,
+        off_m=believed_m if true_m is None else true_m,
         perception_m=np.zeros(n) if true_m is None else true_m - believed_m,
         executive_m=believed_m - tracking_m,
         tracking_m=tracking_m,
-        aside_m=_aside_m(told, motion, right) if true_m is None else true_m,
+        aside_m=_aside_m(known.told, motion, right) if true_m is None else true_m,
         right=right,
         age_s=age_s,
         is_true=true_m is not None,
@@ -180,12 +207,10 @@ def _mean_axis_rad(headings_rad: Floats) -> float:
     return float(0.5 * np.arctan2(np.sin(2 * headings_rad).mean(), np.cos(2 * headings_rad).mean()))
 
 
-def _true_off_m(flight: Flight, motion: Motion) -> Floats | None:
+def _true_off_m(known: Knowledge, motion: Motion) -> Floats | None:
     """The vehicle's true distance from the true line, right of it as flown positive; None where nobody knows it."""
-    if flight.line is None or len(flight.line.axis_ne_m) < 2 or len(flight.truth) < 2 or not len(motion.t_ns):
+    if known.axis_ne_m is None or not len(motion.t_ns):
         return None
-    truth_ns = np.array([pose.t_ns for pose in flight.truth], dtype=np.int64)
-    truth_ne_m = np.array([(pose.north_m, pose.east_m) for pose in flight.truth])
-    ne_m = np.stack([np.interp(motion.t_ns, truth_ns, truth_ne_m[:, k]) for k in (0, 1)], axis=1)
-    distance_m, direction_rad = nearest_on_axis(ne_m, true_axis(flight.line))
+    ne_m = np.stack([np.interp(motion.t_ns, known.truth_ns, known.truth_ne_m[:, k]) for k in (0, 1)], axis=1)
+    distance_m, direction_rad = nearest_on_axis(ne_m, known.axis_ne_m)
     return np.where(np.cos(direction_rad - motion.yaw_rad) < 0.0, -distance_m, distance_m)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.clock import NS_PER_S
-from mission.log.blame.signals import Lateral, Motion, lateral_of
+from mission.log.blame.signals import Lateral, Motion, knowledge_of, lateral_of
 from mission.log.measures import nearest_on_axis
 from mission.log.page.thinning import evenly, extremes
 from mission.log.reader import Flight
@@ -65,6 +65,7 @@ def flight_curves(flight: Flight, motion: Motion, start_ns: int) -> dict[str, An
         curves["round_trip_ms"] = _curve(
             s([sync.t_ns for sync in flight.syncs]), np.array([sync.round_trip_ns / 1e6 for sync in flight.syncs]), 1
         )
+    curves |= _imported_curves(flight, s)
     over = _height_over_line(flight)
     if over is not None:
         times_ns, over_m = over
@@ -79,7 +80,7 @@ def flight_curves(flight: Flight, motion: Motion, start_ns: int) -> dict[str, An
 
 def _lateral_curves(flight: Flight, motion: Motion, t_s: Floats) -> dict[str, Any]:
     """The way off the line and its parts, in the tasks that follow it."""
-    lateral = lateral_of(flight, motion)
+    lateral = lateral_of(knowledge_of(flight), motion)
     is_following = np.zeros(len(motion.t_ns), dtype=np.bool_)
     for span in task_spans(flight):
         if span.task == FOLLOW_TASK:
@@ -113,6 +114,31 @@ def _vision_curves(flight: Flight, s: Seconds) -> dict[str, Any]:
         curves["angle_deg"] = _curve(times_s, np.degrees([estimate.angle_rad for estimate in estimates]), 2)
         curves["offset_px"] = _curve(times_s, np.array([estimate.offset_px for estimate in estimates]), 1)
     return curves
+
+
+def _imported_curves(flight: Flight, s: Seconds) -> dict[str, Any]:
+    """What the autopilot's own log adds: its height, its battery, and what each motor was told."""
+    own = flight.imported
+    if own is None:
+        return {}
+    power_s = s([power.t_ns for power in own.power])
+    curves = {
+        "imported_height": _curve(
+            s([state.t_ns for state in own.states]), np.array([-state.down_m for state in own.states])
+        ),
+        "imported_voltage": _curve(power_s, _numbers([power.voltage_v for power in own.power]), 2),
+        "imported_current": _curve(power_s, _numbers([power.current_a for power in own.power]), 2),
+    }
+    told_s = s([actuators.t_ns for actuators in own.actuators])
+    for k in range(max((len(actuators.motors) for actuators in own.actuators), default=0)):
+        values = [actuators.motors[k] if k < len(actuators.motors) else None for actuators in own.actuators]
+        curves[f"motor_{k + 1}"] = _curve(told_s, _numbers(values))
+    return curves
+
+
+def _numbers(values: Sequence[float | None]) -> Floats:
+    """NaN for what is not known."""
+    return np.array([np.nan if value is None else value for value in values], dtype=np.float64)
 
 
 def _height_over_line(flight: Flight) -> tuple[list[int], Floats] | None:

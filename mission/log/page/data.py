@@ -37,9 +37,10 @@ def page_data(flight: Flight, report: FlightReport) -> dict[str, Any]:
         "truth": _truth(flight, start_ns),
         "line": _line(flight),
         "fixes": _fixes(flight, start_ns),
+        "imported": _imported(flight),
         "curves": flight_curves(flight, motion, start_ns),
         "histograms": _histograms(flight),
-        "texts": [[_s(text.t_ns, start_ns), text.text] for text in flight.status_texts],
+        "texts": _texts(flight, start_ns),
         "facts": _facts(flight),
         "mission_text": flight.mission.text,
     }
@@ -95,6 +96,25 @@ def _line(flight: Flight) -> dict[str, Any] | None:
     }
 
 
+def _imported(flight: Flight) -> dict[str, Any] | None:
+    """The way flown by the autopilot's own log."""
+    if flight.imported is None:
+        return None
+    states = [flight.imported.states[k] for k in evenly(len(flight.imported.states), _TRACK_POINTS).tolist()]
+    return {
+        "north": [round(state.north_m, 3) for state in states],
+        "east": [round(state.east_m, 3) for state in states],
+    }
+
+
+def _texts(flight: Flight, start_ns: int) -> list[tuple[float, str]]:
+    """What the autopilot said to us, and to its own log."""
+    own = () if flight.imported is None else flight.imported.texts
+    said = [(_s(text.t_ns, start_ns), text.text) for text in flight.status_texts]
+    said += [(_s(text.t_ns, start_ns), text.text) for text in own]
+    return sorted(dict.fromkeys(said))
+
+
 def _fixes(flight: Flight, start_ns: int) -> dict[str, Any]:
     placed = [fix for fix in flight.fixes if fix.is_placed]
     kept: list[LineFix] = [placed[k] for k in evenly(len(placed), _FIX_POINTS).tolist()]
@@ -144,6 +164,12 @@ def _facts(flight: Flight) -> dict[str, str]:
         facts["origin"] = f"{latitude:.6f}, {longitude:.6f}, {flight.origin.altitude_m:.0f} m"
     for name in ("versions.json", "host.json"):
         facts |= _attached(flight, name)
+    if flight.imported is not None:
+        own = flight.imported.log
+        facts["the autopilot's own log"] = (
+            f"{own.file}, {own.version}; clocks aligned by {own.aligned_by.replace('_', ' ')}, "
+            f"correlation {own.correlation:.3f}, {own.position_rms_m:.2f} m rms apart"
+        )
     if flight.health:
         last = flight.health[-1]
         facts["log"] = (

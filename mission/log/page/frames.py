@@ -2,7 +2,6 @@
 
 import base64
 import math
-from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -36,35 +35,28 @@ def page_frames(flight: Flight, start_ns: int) -> list[dict[str, Any]]:
     Raises LogError when the log cannot be read any more.
     """
     reports = {report.t_capture_ns: report for report in flight.reports if report.t_capture_ns in flight.image_times_ns}
-    size, n_frames = _choose(flight, list(reports))
+    wanted = {list(reports)[k] for k in evenly(len(reports), MOST_FRAMES).tolist()}
+    jpegs = sorted((t_ns, jpeg) for t_ns, jpeg in read_images(flight) if t_ns in wanted) if wanted else []
+    size, n_frames = _choose([jpeg for _, jpeg in jpegs])
     frames = []
-    for t_ns, jpeg in _some_images(flight, _spread(list(reports), n_frames)):
+    for k in evenly(len(jpegs), n_frames).tolist():
+        t_ns, jpeg = jpegs[k]
         small = _shrink(jpeg, size)
         if small is not None:
             frames.append(_entry(reports[t_ns], *small, (t_ns - start_ns) / NS_PER_S))
-    return sorted(frames, key=lambda frame: frame["t"])
+    return frames
 
 
-def _choose(flight: Flight, times_ns: list[int]) -> tuple[_Size, int]:
+def _choose(jpegs: list[bytes]) -> tuple[_Size, int]:
     """The largest size at which all frames fit, told by trying some of them; fewer frames where none does."""
-    n_frames = min(len(times_ns), MOST_FRAMES)
-    tried = [jpeg for _, jpeg in _some_images(flight, _spread(times_ns, _N_TRIED))]
-    n_bytes = 0.0
+    tried = [jpegs[k] for k in evenly(len(jpegs), _N_TRIED).tolist()]
+    n_bytes = 1.0
     for size in _SIZES:
         lengths = [len(small[0]) for jpeg in tried if (small := _shrink(jpeg, size)) is not None]
-        n_bytes = sum(lengths) / max(1, len(lengths))
-        if n_bytes * n_frames <= BUDGET_BYTES:
-            return size, n_frames
+        n_bytes = max(1.0, sum(lengths) / max(1, len(lengths)))
+        if n_bytes * len(jpegs) <= BUDGET_BYTES:
+            return size, len(jpegs)
     return _SIZES[-1], int(BUDGET_BYTES / n_bytes)
-
-
-def _spread(times_ns: list[int], most: int) -> set[int]:
-    return {times_ns[k] for k in evenly(len(times_ns), most).tolist()}
-
-
-def _some_images(flight: Flight, times_ns: set[int]) -> Iterator[tuple[int, bytes]]:
-    if times_ns:
-        yield from ((t_ns, jpeg) for t_ns, jpeg in read_images(flight) if t_ns in times_ns)
 
 
 def _shrink(jpeg: bytes, size: _Size) -> tuple[bytes, float] | None:

@@ -245,12 +245,18 @@
     paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", font: { color: color("ink"), size: 12, family: "system-ui, sans-serif" },
     margin: { l: 46, r: 12, t: 8, b: 30 }, showlegend: false, hoverlabel: { bgcolor: color("card"), font: { color: color("ink") } }, ...more,
   });
-  const pieces = () => report.tasks.map((task) => {
-    const first = Math.max(0, indexAt(flight.track.t, task.start_s));
-    const last = task.end_s === null ? flight.track.t.length : indexAt(flight.track.t, task.end_s) + 2;
-    const cut = (name) => flight.track[name].slice(first, last);
-    return { task, east: cut("east"), north: cut("north"), up: cut("up"), t: cut("t") };
-  });
+  /** The track as one curve for each kind of task, with gaps: a trace costs more than its points. */
+  const pieces = () => {
+    const found = new Map();
+    for (const task of report.tasks) {
+      const first = Math.max(0, indexAt(flight.track.t, task.start_s));
+      const last = task.end_s === null ? flight.track.t.length : indexAt(flight.track.t, task.end_s) + 2;
+      if (!found.has(task.task)) found.set(task.task, { task, east: [], north: [], up: [], t: [] });
+      const piece = found.get(task.task);
+      for (const name of ["east", "north", "up", "t"]) piece[name].push(...flight.track[name].slice(first, last), null);
+    }
+    return found.values();
+  };
   const troubled = () => report.excursions.map((trouble) => {
     const first = Math.max(0, indexAt(flight.track.t, trouble.start_s)), last = indexAt(flight.track.t, trouble.end_s) + 2;
     const cut = (name) => flight.track[name].slice(first, last);
@@ -282,17 +288,19 @@
     if (flight.fixes.t.length) push({ name: "line as known", mode: "markers", x: flight.fixes.east, y: flight.fixes.north, marker: { color: color("line"), size: 3, opacity: 0.55 } });
     push({ name: "setpoint", x: flight.track.setpoint_east, y: flight.track.setpoint_north, line: { color: color("setpoint"), width: 1, dash: "dot" } });
     if (flight.truth) push({ name: "true way", x: flight.truth.east, y: flight.truth.north, line: { color: color("truth"), width: 1.2 } });
-    for (const piece of pieces()) push({ name: words(piece.task.task), x: piece.east, y: piece.north, text: piece.t.map(clock), hoverinfo: "text+name", customdata: piece.t, line: { color: TASKS[piece.task.task] ?? color("ink"), width: 4 } });
+    if (flight.imported) push({ name: "the autopilot's own log", x: flight.imported.east, y: flight.imported.north, line: { color: color("executive"), width: 1.2, dash: "dash" } });
+    for (const piece of pieces()) push({ name: words(piece.task.task), x: piece.east, y: piece.north, text: piece.t.map((t) => (t === null ? "" : clock(t))), hoverinfo: "text+name", customdata: piece.t, line: { color: TASKS[piece.task.task] ?? color("ink"), width: 4 } });
     for (const { trouble, east, north } of troubled()) push({ name: words(trouble.kind), x: east, y: north, line: { color: color("bad"), width: 6 }, opacity: 0.6 });
     const images = flight.ground ? [{ source: flight.ground.image, xref: "x", yref: "y", x: flight.ground.west_m, y: flight.ground.north_m, sizex: flight.ground.width_m, sizey: flight.ground.height_m, sizing: "stretch", layer: "below", opacity: 0.75 }] : [];
-    Plotly.newPlot("map", traces, layout({
+    const drawn = Plotly.newPlot("map", traces, layout({
       xaxis: axis({ title: { text: "east [m]" }, range: [box.w, box.e], zeroline: false, showgrid: !flight.ground }),
       yaxis: axis({ title: { text: "north [m]" }, range: [box.s, box.n], scaleanchor: "x", zeroline: false, showgrid: !flight.ground }),
       hovermode: "closest", dragmode: "pan", images,
     }), { ...CONFIG, scrollZoom: true });
-    $("map").on("plotly_click", (event) => { const t = event.points[0]?.customdata; if (t !== undefined) setTime(t); });
+    $("map").on("plotly_click", (event) => { const t = event.points[0]?.customdata; if (t !== undefined && t !== null) setTime(t); });
     $("map").on("plotly_relayout", moveArrow);
     $("map").on("plotly_afterplot", moveArrow);
+    return drawn;
   }
 
   function moveArrow() {
@@ -357,13 +365,15 @@
 
   const CHARTS = [
     ["From the line, and why", "m", [["off_line", "off the line", "ink", 2], ["perception", "the line elsewhere than told", "perception", 1.2], ["executive", "setpoint off the line as told", "executive", 1.2], ["tracking", "vehicle off its setpoint", "autopilot", 1.2]]],
-    ["Height", "m", [["height_setpoint", "setpoint", "setpoint", 2], ["height", "vehicle", "ink", 1.6], ["height_over_line", "over the conductors, true", "truth", 1.4], ["height_over_line_known", "over the conductors, as known", "line", 1.2]]],
+    ["Height", "m", [["height_setpoint", "setpoint", "setpoint", 2], ["height", "vehicle", "ink", 1.6], ["imported_height", "the autopilot's own log", "executive", 1.2], ["height_over_line", "over the conductors, true", "truth", 1.4], ["height_over_line_known", "over the conductors, as known", "line", 1.2]]],
     ["The line in the image: angle", "°", [["angle_deg", "angle", "perception", 1.2]]],
     ["The line in the image: offset", "px", [["offset_px", "offset", "perception", 1.2]]],
     ["Setpoint against achieved", "m", [["from_setpoint", "vehicle from its setpoint", "autopilot", 1.4]]],
     ["Speed and tilt", "m/s, °/10", [["speed", "speed", "ink", 1.6], ["tilt_tenth", "tilt in tens of degrees", "wind", 1.2], ["push", "push of the air [m/s²]", "executive", 1]]],
     ["Delays", "ms", [["latency_ms", "frame to estimate", "perception", 1], ["telemetry_age_ms", "telemetry's age", "executive", 1], ["tick_late_ms", "control tick late", "bad", 1], ["round_trip_ms", "link there and back", "wind", 1.2]]],
     ["Battery", "%", [["battery", "battery", "good", 1.6]]],
+    ["Battery, by the autopilot's own log", "V, A", [["imported_voltage", "voltage", "good", 1.4], ["imported_current", "current", "wind", 1.2]]],
+    ["Motors, by the autopilot's own log", "share", [1, 2, 3, 4, 5, 6, 7, 8].map((k) => [`motor_${k}`, `motor ${k}`, ["ink", "perception", "executive", "autopilot", "wind", "line", "good", "bad"][k - 1], 1])],
   ];
   const charts = [];
   let isSyncing = false;
@@ -476,7 +486,14 @@
   tables();
   tabs();
   setTime(report.tasks.find((task) => task.task === "follow_lines")?.start_s ?? 0);
-  requestAnimationFrame(() => { drawMap(); drawCharts(); document.body.dataset.ready = "yes"; });
+  requestAnimationFrame(() => {
+    const map = drawMap();
+    drawCharts();
+    map.then(() => requestAnimationFrame(() => {
+      performance.mark("drawn");
+      document.body.dataset.ready = "yes";
+    }));
+  });
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => location.reload());
   window.lineflight = { setTime, get now() { return now; }, get frame() { return shown; } };
 })();
