@@ -99,7 +99,7 @@ class Recorder:
         assert self._file is not None  # noqa: S101
         try:
             log = McapLog(self._file, self.mission)
-            next_flush_s = time.monotonic() + _FLUSH_PERIOD_S
+            next_flush_s = time.monotonic()  # at once: a log that is cut off in its first second opens, too
             while (records := self._backlog.take(_FLUSH_PERIOD_S)) is not None:
                 for record in records:
                     if self._file.failure is None:

@@ -47,7 +47,8 @@
   table("tasktable", "Tasks", ["", "1 took [s]", "other took [s]", "1", "other"],
     data.tasks.flat().map((task) => [words(task.task), ...task.took_s.map(number), ...task.results.map((r) => (r === null ? "not flown" : words(r)))]));
 
-  requestAnimationFrame(() => {
+  addEventListener("DOMContentLoaded", () => requestAnimationFrame(() => setTimeout(() => {
+    document.head.append(make("script", $("plotly").textContent));
     const traces = [];
     for (const conductor of data.conductors) traces.push({ type: "scatter", mode: "lines", hoverinfo: "skip", name: "conductor", x: conductor.map((p) => p[1]), y: conductor.map((p) => p[0]), line: { color: color("line"), width: 1 } });
     const box = [Infinity, -Infinity, Infinity, -Infinity];
@@ -71,6 +72,6 @@
     }
     for (const draw of draws) draw(); // once all cards stand, and have their widths
     document.body.dataset.ready = "yes";
-  });
+  })));
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => location.reload());
 })();

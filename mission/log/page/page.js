@@ -356,7 +356,7 @@
         for (const other of document.querySelectorAll(".tabs button")) other.setAttribute("aria-selected", String(other === button));
         $("map").hidden = button.dataset.view !== "map";
         $("space").hidden = button.dataset.view !== "space";
-        if (button.dataset.view === "space" && cursorTrace < 0) drawSpace();
+        if (button.dataset.view === "space" && cursorTrace < 0 && window.Plotly) drawSpace();
         moveArrow();
         moveInSpace();
       });
@@ -486,14 +486,18 @@
   tables();
   tabs();
   setTime(report.tasks.find((task) => task.task === "follow_lines")?.start_s ?? 0);
-  requestAnimationFrame(() => {
+  performance.mark("usable");
+  // The plots' library takes a second to be read: what needs no plot is there before it.
+  addEventListener("DOMContentLoaded", () => requestAnimationFrame(() => setTimeout(() => {
+    document.head.append(make("script", {}, $("plotly").textContent));
     const map = drawMap();
     drawCharts();
+    if (!$("space").hidden) drawSpace();
     map.then(() => requestAnimationFrame(() => {
       performance.mark("drawn");
       document.body.dataset.ready = "yes";
     }));
-  });
+  })));
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => location.reload());
   window.lineflight = { setTime, get now() { return now; }, get frame() { return shown; } };
 })();

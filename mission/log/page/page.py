@@ -39,8 +39,8 @@ def fill(name: str, title: str, data: dict[str, Any]) -> str:
         "%%TITLE%%": html.escape(title),
         "%%STYLE%%": _own("page.css"),
         "%%DATA%%": json.dumps(data, separators=(",", ":"), allow_nan=False).replace("</", "<\\/"),
-        "%%PLOTLY%%": importlib.resources.files("plotly").joinpath("package_data/plotly.min.js").read_text("utf-8"),
         "%%SCRIPT%%": _own(f"{name}.js"),
+        "%%PLOTLY%%": importlib.resources.files("plotly").joinpath("package_data/plotly.min.js").read_text("utf-8"),
     }
     page = _own(f"{name}.html")
     pieces = []

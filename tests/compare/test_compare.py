@@ -1,0 +1,141 @@
+"""Flights held against each other: figures, tasks side by side, and conditions for a build server."""
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from mission.autopilot import VehicleState
+from mission.compare.comparison import compare_reports
+from mission.compare.conditions import ConditionError, parse_condition
+from mission.compare.figures import pair_tasks
+from mission.ending import EXIT_BAD_INPUT, EXIT_DIFFERENT, EXIT_FAILED_FILE
+from mission.log.inspection import inspect_flight
+from mission.log.reader import read_flight
+from mission.log.summary import TaskSummary
+from mission.records import TaskEnded, TaskStarted, TruePose
+from tests.log.synthetic_flight import fly, write_log
+from tests.support.command_line import lineflight
+
+
+@pytest.fixture(scope="module")
+def logs(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """A flight, and one that flew 0.5 m further to the north and lacks its last leg's events."""
+    folder = tmp_path_factory.mktemp("logs")
+    first, second = folder / "first.mcap", folder / "second.mcap"
+    write_log(first, list(fly()))
+    write_log(second, [(t_ns, shifted(item)) for t_ns, item in fly()])
+    return first, second
+
+
+def shifted(item: object) -> object:
+    return replace(item, north_m=item.north_m + 0.5) if isinstance(item, VehicleState | TruePose) else item
+
+
+def test_a_change_is_what_the_second_has_more(logs: tuple[Path, Path]) -> None:
+    comparison = compare_reports(["a", "b"], [inspect_flight(read_flight(log)) for log in logs])
+    assert comparison.change("lateral_mean_m", 1) == pytest.approx(0.32, abs=0.05)
+    assert comparison.change("leg_1_straightness_mean_m", 1) == pytest.approx(0.0, abs=1e-9)
+    assert comparison.change("duration_s", 1) == 0.0
+    assert all(pair.first is not None and pair.other is not None for pair in comparison.tasks[0])
+
+
+def task(name: str) -> TaskSummary:
+    return TaskSummary(name, 0.0, 1.0, "completed", "")
+
+
+def test_tasks_are_paired_by_name_in_their_order() -> None:
+    first = [task(name) for name in ("takeoff", "align", "follow_lines", "land")]
+    other = [task(name) for name in ("takeoff", "follow_lines", "hold", "land")]
+    pairs = [(a and a.task, b and b.task) for a, b in ((p.first, p.other) for p in pair_tasks(first, other))]
+    assert pairs == [
+        ("takeoff", "takeoff"),
+        ("align", None),
+        ("follow_lines", "follow_lines"),
+        (None, "hold"),
+        ("land", "land"),
+    ]
+
+
+@given(st.lists(st.sampled_from("abc")), st.lists(st.sampled_from("abc")))
+def test_no_task_is_lost_in_pairing(first: list[str], other: list[str]) -> None:
+    pairs = pair_tasks([task(name) for name in first], [task(name) for name in other])
+    assert [pair.first.task for pair in pairs if pair.first is not None] == first
+    assert [pair.other.task for pair in pairs if pair.other is not None] == other
+    assert all(pair.first is None or pair.other is None or pair.first.task == pair.other.task for pair in pairs)
+
+
+KNOWN = ["lateral_p95_m", "latency_p95_ms"]
+
+
+@pytest.mark.parametrize(
+    ("text", "first", "last", "fails"),
+    [
+        ("lateral_p95_m>0.5", 0.1, 0.6, True),
+        ("lateral_p95_m>0.5", 0.9, 0.5, False),
+        ("lateral_p95_m >= 0.5", 0.9, 0.5, True),
+        ("lateral_p95_m<0.5", 0.9, 0.4, True),
+        ("lateral_p95_m<=4e-1", 0.9, 0.4, True),
+        ("change:lateral_p95_m>0.1", 0.1, 0.3, True),
+        ("change:lateral_p95_m>0.1", 0.3, 0.3, False),
+        ("change:lateral_p95_m<-0.1", 0.5, 0.3, True),
+        ("lateral_p95_m>0.5", 0.1, None, True),  # what cannot be judged must not pass
+        ("change:lateral_p95_m>0.5", None, 0.1, True),
+    ],
+)
+def test_conditions(text: str, first: float | None, last: float | None, fails: bool) -> None:
+    condition = parse_condition(text, KNOWN)
+    assert (condition.failure({"lateral_p95_m": first}, {"lateral_p95_m": last}) is not None) == fails
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("lateral_p95_m", "is no condition"),
+        ("lateral_p95_m==1", "is no condition"),
+        ("lateral_p95>0.5", "did you mean lateral_p95_m"),
+        ("zzz>0.5", "there are latency_p95_ms, lateral_p95_m"),
+        ("lateral_p95_m>0.5; rm -rf", "is no condition"),
+    ],
+)
+def test_what_is_no_condition_is_refused_in_a_sentence(text: str, words: str) -> None:
+    with pytest.raises(ConditionError, match=words):
+        parse_condition(text, KNOWN)
+
+
+def test_the_command_compares_and_fails_where_it_is_told_to(logs: tuple[Path, Path], tmp_path: Path) -> None:
+    page = tmp_path / "compared.html"
+    ran = lineflight("compare", *logs, "--html", page, "--fail-if", "lateral_p95_m>0.5")
+    assert ran.code == EXIT_DIFFERENT
+    assert "lateral_p95_m is 0.7" in ran.err
+    assert "lateral_mean_m" in ran.out
+    assert page.stat().st_size > 1_000_000
+    fine = lineflight("compare", *logs, "--json", "--fail-if", "lateral_p95_m>5")
+    assert fine.code == 0
+    answer = json.loads(fine.out)
+    assert answer["failures"] == []
+    assert answer["figures"]["duration_s"][0] == answer["figures"]["duration_s"][1]
+    assert answer["tasks"][0][0]["task"] == "takeoff"
+
+
+def test_what_cannot_be_compared_is_refused_in_a_sentence(logs: tuple[Path, Path], tmp_path: Path) -> None:
+    first, second = logs
+    for arguments, code in (
+        ([first], EXIT_BAD_INPUT),
+        ([first, tmp_path / "no.mcap"], EXIT_BAD_INPUT),
+        ([first, second, "--fail-if", "lateral>1"], EXIT_BAD_INPUT),
+        ([first, second, "--html", tmp_path / "no" / "page.html"], EXIT_FAILED_FILE),
+    ):
+        ran = lineflight("compare", *arguments)
+        assert (ran.code, ran.err.count("\n")) == (code, 1), ran.err
+
+
+def test_a_task_that_only_one_has_flown_is_told(logs: tuple[Path, Path], tmp_path: Path) -> None:
+    lacking = tmp_path / "lacking.mcap"
+    kept = [(t, item) for t, item in fly() if not (isinstance(item, TaskStarted | TaskEnded) and item.task == "align")]
+    write_log(lacking, kept)
+    ran = lineflight("compare", logs[0], lacking)
+    assert "only first flew align" in ran.out
