@@ -6,7 +6,7 @@ MISSION ?= missions/follow_line.yaml
 FLY ?= --speed 1.5
 PYTEST ?=
 
-.PHONY: fly test test-v4l2 test-page golden check bench bench-inspection bench-vision bench-jitter bench-soak bench-following bench-rendered world-pictures schema diagram safety-table clean clean-v4l2
+.PHONY: fly test test-v4l2 test-page golden check bench bench-inspection bench-vision bench-jitter bench-soak bench-following bench-rendered world-pictures schema diagram safety-table streams-table clean clean-v4l2
 
 fly: $(VENV)/.installed
 	$(BIN)/lineflight dry-run $(MISSION) $(FLY)
@@ -61,6 +61,9 @@ schema: $(VENV)/.installed
 
 safety-table: $(VENV)/.installed-dev
 	$(BIN)/python -m tests.faults.page
+
+streams-table: $(VENV)/.installed-dev
+	$(BIN)/python -m tests.docs.streams_table
 
 diagram: $(VENV)/.installed
 	$(BIN)/python -m tests.docs.state_machine_page

@@ -90,11 +90,12 @@ def finish(outcome: "FlightOutcome", *, as_json: bool, aftermath: "Aftermath | N
         sys.stderr.write(f"{error}\nThe mission {outcome.ended.result}: {outcome.ended.reason}.\n")
         raise typer.Exit(_exit_code(outcome)) from None
     picture = _draw(outcome.log, None if aftermath is None else aftermath.world) if report.tasks else None
+    page = _write_page(outcome.log, report) if report.tasks and aftermath is not None else None
     contact = None if aftermath is None else aftermath.contact
     if as_json:
         from mission.log.summary import to_json
 
-        extra = {"log": str(outcome.log), "picture": None if picture is None else str(picture)}
+        extra = {"log": str(outcome.log), "picture": _text(picture), "page": _text(page)}
         typer.echo(json.dumps(to_json(report) | extra | ({} if aftermath is None else aftermath.to_json())))
     else:
         print_report(report, as_json=False)
@@ -103,12 +104,29 @@ def finish(outcome: "FlightOutcome", *, as_json: bool, aftermath: "Aftermath | N
         typer.echo(f"log      {outcome.log}")
         if picture is not None:
             typer.echo(f"picture  {picture}")
+        if page is not None:
+            typer.echo(f"page     {page}")
         if aftermath is not None and aftermath.speed is not None:
             typer.echo(f"speed    {aftermath.speed:.2f} times real time")
     if contact is not None:
         sys.stderr.write(contact + "\n")
         raise typer.Exit(EXIT_ENDED_EARLY)
     raise typer.Exit(_exit_code(outcome))
+
+
+def _text(path: Path | None) -> str | None:
+    return None if path is None else str(path)
+
+
+def _write_page(log: Path, report: "FlightReport") -> Path | None:
+    """The flight's page, beside the log of a simulated flight; None, with a word, when there can be none."""
+    from mission.flight_page import PageError, write_page
+
+    try:
+        return write_page(log, log.with_suffix(".html"), report)
+    except PageError as error:
+        sys.stderr.write(f"{error}\n")
+        return None
 
 
 def _exit_code(outcome: "FlightOutcome") -> int:

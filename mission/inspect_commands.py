@@ -3,17 +3,13 @@
 import json
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import Annotated
 
 import typer
 
 from mission.ending import EXIT_BAD_INPUT, EXIT_DIFFERENT, EXIT_FAILED_FILE, fail, print_report
 from mission.fly_commands import JsonOption
 from mission.log.errors import LogError
-
-if TYPE_CHECKING:
-    from mission.log.page.page import Ground
-    from mission.log.reader import Flight
 
 LogArgument = Annotated[Path, typer.Argument(help="A flight log (.mcap).")]
 
@@ -33,14 +29,15 @@ def inspect(
         flight = read_flight(log)
         report = inspect_flight(flight)
         if html is not None:
+            from mission.flight_page import ground_of
             from mission.log.page.page import flight_page
 
-            text = flight_page(flight, report, _ground(flight))
+            text = flight_page(flight, report, ground_of(flight))
     except LogError as error:
         fail(str(error), EXIT_BAD_INPUT)
     print_report(report, as_json=as_json)
     if html is not None:
-        write_page(html, text)
+        _write(html, text)
 
 
 def compare(
@@ -81,7 +78,7 @@ def compare(
     if html is not None:
         from mission.compare.page import comparison_page
 
-        write_page(html, comparison_page(comparison, flights))
+        _write(html, comparison_page(comparison, flights))
     if failures:
         fail("\n".join(failures), EXIT_DIFFERENT)
 
@@ -135,23 +132,12 @@ def replay(
         raise typer.Exit(EXIT_DIFFERENT)
 
 
-def write_page(path: Path, text: str) -> None:
+def _write(path: Path, text: str) -> None:
     """Write a page, or end with why it cannot be written."""
+    from mission.flight_page import PageError, write_text
+
     try:
-        path.write_text(text, encoding="utf-8")
-    except OSError as error:
-        fail(
-            f"The page {path} cannot be written ({error.strerror}); name a file in a folder that there is.",
-            EXIT_FAILED_FILE,
-        )
+        write_text(path, text)
+    except PageError as error:
+        fail(str(error), EXIT_FAILED_FILE)
     sys.stderr.write(f"page     {path} ({len(text.encode()) / 1e6:.1f} MB)\n")
-
-
-def _ground(flight: "Flight") -> "Ground | None":
-    """The simulated world's ground under a flight; None where it was flown elsewhere, or that world is not here."""
-    world_name = flight.mission.metadata.get("world")
-    if world_name is None:
-        return None
-    from mission.simulated.page_ground import page_ground
-
-    return page_ground(flight, world_name, flight.mission.metadata.get("light"))

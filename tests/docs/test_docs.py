@@ -1,5 +1,6 @@
 """The documents: no dead link, and tables that are the code's."""
 
+import json
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -8,11 +9,14 @@ from typing import get_args
 import pytest
 
 from mission.build import reactions
+from mission.log import channels
 from mission.plan import ParameterCheck, SafetyPlan
 from mission.preflight_checks import check_all
 from mission.safety import FIXED_REACTIONS, PRIORITY, Reaction
 from sitl.world.file import shipped_worlds
 from tests.docs.state_machine_page import PAGE, page
+from tests.docs.streams_table import PAGE as LOG_PAGE
+from tests.docs.streams_table import with_table
 from tests.mission.test_preflight_checks import FINE, PLAN
 
 ROOT = Path(__file__).parents[2]
@@ -50,6 +54,24 @@ def test_the_preflight_page_names_every_check() -> None:
 
 def test_the_state_machine_is_drawn_from_the_code() -> None:
     assert PAGE.read_text(encoding="utf-8") == page(), "run make diagram"
+
+
+def test_the_page_on_the_log_has_the_streams_of_the_code() -> None:
+    written = LOG_PAGE.read_text(encoding="utf-8")
+    assert written == with_table(written), "run make streams-table"
+
+
+def test_the_layout_for_foxglove_shows_streams_that_there_are() -> None:
+    layout = json.loads((ROOT / "examples/foxglove-layout.json").read_text(encoding="utf-8"))
+    fields = {c.topic: set(channels.json_schema(c.record)["properties"]) for c in channels.RECORD_CHANNELS}
+    topics = {*fields, *(channel.topic for channel in channels.FOXGLOVE_CHANNELS)}
+    text = json.dumps(layout["configById"])
+    named = re.findall(r'"(/[a-z_/]+)((?:\.\w+)*)"', text)
+    assert len(named) > 12
+    for topic, path in named:
+        assert topic in topics
+        assert not path or path.split(".")[1] in fields[topic]
+    assert sorted(re.findall(r'"(\w+!\w+)"', json.dumps(layout["layout"]))) == sorted(layout["configById"])
 
 
 def test_the_page_on_worlds_shows_every_world_from_above_and_from_the_front() -> None:

@@ -47,6 +47,7 @@ def test_dry_run_follows_the_line_and_comes_home(tmp_path: Path) -> None:
     assert report["preflight"]["n_checks"] >= 18
     assert report["preflight"]["warnings"] == report["preflight"]["failures"] == []
     assert Path(report["picture"]).stat().st_size > 100_000
+    assert Path(report["page"]).stat().st_size > 5_000_000
 
     inspected = lineflight("inspect", report["log"], "--json")
     assert inspected.code == 0
