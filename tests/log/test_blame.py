@@ -3,6 +3,7 @@
 import math
 import random
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -10,6 +11,8 @@ import yaml
 
 from mission.log.blame.blame import find_excursions
 from mission.log.blame.records import Culprit, Excursion, Fault
+from mission.log.imported import Imported, ImportedActuators, ImportedLog
+from mission.log.reader import read_flight
 from mission.plan import MissionPlan
 from sitl.gust_front import GustFronts, one_minus_cosine
 from sitl.wind import Wind
@@ -135,3 +138,20 @@ def check(named: dict[int, tuple[Excursion, ...]], culprit: Culprit, fault: Faul
     """What is told of first is what was caused, in nine of ten flights."""
     right = [seed for seed, found in named.items() if found and (found[0].culprit, found[0].fault) == (culprit, fault)]
     assert len(right) >= 9, {seed: found for seed, found in named.items() if seed not in right}
+
+
+def test_a_motor_that_is_asked_for_more_than_the_others_is_named(tmp_path: Path) -> None:
+    """The autopilot's own log, laid beside ours, tells which one is weak."""
+    path = tmp_path / "1.mcap"
+    draw = random.Random("weak motor 1")
+    fly(path, 1, lambda cockpit: weaken(cockpit, draw))
+    flight = read_flight(path)
+    aligned = (0.0, 0.0, 0.0, "motion", None, 0.99, 60.0, 0.1, 0.1, (0.0, 0.0, 0.0))
+    log = ImportedLog("a.ulg", "ulog", "v1.16", "", "00", *aligned, was_cut_off=False)
+    told = tuple(ImportedActuators(state.t_ns, (0.5, 0.5, 0.8, 0.5, 0.5, 0.5)) for state in flight.states)
+    own = Imported(log, (), (), told, (), (), ())
+    (found,) = find_excursions(replace(flight, imported=own))
+    assert "motor 3 was asked for 0.80, the others for 0.50" in found.evidence[-1]
+    level = tuple(replace(one, motors=(0.5, 0.52, 0.55, 0.5, 0.51, 0.5)) for one in told)
+    (found,) = find_excursions(replace(flight, imported=replace(own, actuators=level)))
+    assert not any("motor" in words for words in found.evidence)

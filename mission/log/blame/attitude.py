@@ -15,6 +15,7 @@ from mission.log.blame.tracking import TILT_LIMIT_RAD
 
 Floats = NDArray[np.float64]
 
+_MOTOR_MORE = 0.12  # of full thrust
 _STILL_RAD, _STILL_S = math.radians(2.0), 2.0  # a setpoint whose yaw moves by less within this time stands still
 
 
@@ -32,6 +33,7 @@ def off_height(leg: Leg, limits: Limits) -> Iterator[Excursion]:
             words.append(
                 f"it was tilted by {math.degrees(tilt_rad):.0f} degrees against the wind, and its thrust had to do both"
             )
+        words += _motor_words(leg, start_ns, end_ns)
         yield Excursion(
             Kind.OFF_HEIGHT,
             leg.task,
@@ -66,6 +68,7 @@ def off_heading(leg: Leg, limits: Limits) -> Iterator[Excursion]:
             words.append(
                 f"it sank {sunk_m:.2f} m meanwhile, as one does whose rotors do not give what is asked of them"
             )
+        words += _motor_words(leg, start_ns, end_ns)
         yield Excursion(
             Kind.OFF_HEADING,
             leg.task,
@@ -90,3 +93,19 @@ def _is_still(motion: Motion, start_ns: int) -> NDArray[np.bool_]:
 
 def _wrapped(angles_rad: Floats) -> Floats:
     return np.asarray(np.remainder(angles_rad + np.pi, 2 * np.pi) - np.pi)
+
+
+def _motor_words(leg: Leg, start_ns: int, end_ns: int) -> list[str]:
+    """Whether one motor was asked for much more than the others: its propeller, or it itself, gives less."""
+    told = [one.motors for one in leg.motors if start_ns <= one.t_ns <= end_ns]
+    n_motors = min(map(len, told), default=0)
+    if n_motors < 3:
+        return []
+    means = np.array([motors[:n_motors] for motors in told]).mean(axis=0)
+    most = int(means.argmax())
+    others = float(np.median(np.delete(means, most)))
+    if means[most] - others < _MOTOR_MORE:
+        return []
+    return [
+        f"motor {most + 1} was asked for {means[most]:.2f}, the others for {others:.2f}: it gives less than they do"
+    ]

@@ -10,6 +10,7 @@ from drivers.camera.camera import Intrinsics
 from drivers.clock import NS_PER_S
 from mission.log.blame.lag import ImageLag, image_lag, line_slope
 from mission.log.blame.signals import Knowledge, Lateral, Motion, lateral_of
+from mission.log.imported import ImportedActuators
 from mission.log.reader import Flight
 from mission.log.summary import TaskSpan
 from vision.records import VisionReport
@@ -28,7 +29,7 @@ class Leg:
     `motion` and `lateral` begin GROWTH_S earlier; `is_flown` (n,) tells which of their samples lie within the leg.
     `lag` is how late the frames' times are, where they are, `depth_m` how far below the line was in the median. `view`
     tells at each sample how far from the middle of the picture the line must have been, 1 at its edge; None where the
-    height over it or the camera is not known.
+    height over it or the camera is not known. `motors` are what they were told, where the autopilot's own log is there.
     """
 
     task: str
@@ -41,6 +42,7 @@ class Leg:
     lag: ImageLag | None
     depth_m: float | None
     view: Floats | None
+    motors: tuple[ImportedActuators, ...]
 
     @property
     def has_estimates(self) -> bool:
@@ -63,7 +65,9 @@ def leg_of(flight: Flight, whole: Motion, known: Knowledge, span: TaskSpan) -> L
         slope = line_slope(lateral.aside_m, motion.roll_rad, depth_m)
         lag = _lag(camera, lateral.t_ns[is_flown], slope[is_flown], reports)
         view = np.nan_to_num(np.abs(slope)) * 2.0 * camera.fx_px / camera.width_px
-    return Leg(span.task, span.start_ns, end_ns, motion, lateral, is_flown, reports, lag, depth_m, view)
+    own = () if flight.imported is None else flight.imported.actuators
+    motors = tuple(told for told in own if span.start_ns <= told.t_ns <= end_ns)
+    return Leg(span.task, span.start_ns, end_ns, motion, lateral, is_flown, reports, lag, depth_m, view, motors)
 
 
 def _lag(camera: Intrinsics, t_ns: Times, slope: Floats, reports: tuple[VisionReport, ...]) -> ImageLag | None:

@@ -40,11 +40,15 @@ def off_line(leg: Leg, limits: Limits) -> Iterator[Excursion]:
             culprit, fault, evidence = of_tracking(leg.motion, lateral, peak, side)
         words = "right" if side > 0 else "left"
         known = "" if lateral.is_true else " as it was known"
-        first = (
-            f"{abs(off_m[peak]):.2f} m to the {words} of the line{known}; of the "
-            f"mean beyond the limit the line as told was {shares['perception']:+.2f} m, the setpoint "
-            f"{shares['executive']:+.2f} m, the vehicle's way off its setpoint {shares['tracking']:+.2f} m"
-        )
+        parts = {
+            "the line elsewhere than told": shares["perception"],
+            "the setpoint off the line as told": shares["executive"],
+            "the vehicle off its setpoint": shares["tracking"],
+        }
+        made_of = ", ".join(f"{name} {part:+.2f} m" for name, part in parts.items() if math.isfinite(part))
+        first = f"{abs(off_m[peak]):.2f} m to the {words} of the line{known}"
+        if made_of:
+            first += f"; while beyond the limit, in the mean: {made_of}"
         yield Excursion(
             Kind.OFF_LINE,
             leg.task,

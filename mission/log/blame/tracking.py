@@ -46,8 +46,8 @@ def of_tracking(motion: Motion, lateral: Lateral, peak: int, side: float) -> tup
     took_s = float(t_s[-1] - t_s[0])
     tilt_rad = float(motion.tilt_rad[during].max())
     words = [
-        f"in the {took_s:.1f} s in which it left its setpoint by {tracking_m[peak]:.2f} m the air pushed it by "
-        f"{push_m_s:+.1f} m/s more than just before, its own thrust by {thrust_m_s:+.1f} m/s"
+        f"in {took_s:.1f} s it left its setpoint by {tracking_m[peak]:.2f} m: {_went('the air pushed it', push_m_s)}, "
+        f"{_went('its own thrust took it', thrust_m_s)}, compared with just before"
     ]
     if tilt_rad > TILT_LIMIT_RAD:
         words.append(f"it was tilted by {math.degrees(tilt_rad):.0f} degrees, which is about as far as it may")
@@ -62,6 +62,10 @@ def _growth_start(t_ns: NDArray[np.int64], values: Floats, peak: int) -> int:
     small = np.flatnonzero(~(values[earliest:peak] > _BEGUN * values[peak]))
     start = earliest + (int(small[-1]) if small.size else 0)
     return min(start, peak - 1) if peak else 0
+
+
+def _went(who: str, away_m_s: float) -> str:
+    return f"{who} {'away' if away_m_s > 0.0 else 'back'} by {abs(away_m_s):.1f} m/s"
 
 
 def _moved_words(moved_m: float, turned_rad: float) -> str:
