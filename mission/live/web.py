@@ -22,6 +22,7 @@ _READ_TIMEOUT_S = 5.0
 _CONNECTION_LIMIT_S = 15.0
 _MAX_CONNECTIONS = 32
 _MAX_BODY_BYTES = 1024
+_MAX_LINES = 60  # in a header, beside their frame; no line has more conductors
 _COMMANDS = {f"/{wish}": wish for wish in Wish}
 
 
@@ -112,7 +113,8 @@ class _Handler(BaseHTTPRequestHandler):
                 drawn = _json(board.map())
             self._answer(200, "application/json", drawn)
         elif path == "/frame.jpg" and (frame := board.frame) is not None:
-            self._answer(200, "image/jpeg", frame.jpeg, ("X-Seq", str(frame.seq)))
+            lines = ("X-Lines", json.dumps(frame.lines_px[:_MAX_LINES], separators=(",", ":")))
+            self._answer(200, "image/jpeg", frame.jpeg, ("X-Seq", str(frame.seq)), lines)
         else:
             self._refuse(Refusal(404, "There is nothing here."))
 

@@ -111,9 +111,13 @@ class Browser:
 
     def open(self, file: Path) -> None:
         """Open a file and wait until its script has drawn."""
-        self.page = Page()
-        self.send("Page.navigate", url=file.resolve().as_uri())
+        self.go(file.resolve().as_uri())
         self.wait_for("document.body && document.body.dataset.ready === 'yes'")
+
+    def go(self, url: str) -> None:
+        """Go to an address; waits for nothing."""
+        self.page = Page()
+        self.send("Page.navigate", url=url)
 
     def wait_for(self, expression: str) -> None:
         """Wait until an expression is true."""

@@ -4,21 +4,29 @@ Not collected with the others, since it needs Chromium: `make test-page` runs it
 screenshots.
 """
 
+import itertools
 import os
 from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
 
+from mission.autopilot import Setpoint
+from mission.live.feed import LiveFeed
+from mission.live.settings import Briefing, LiveSettings
 from mission.log.inspection import inspect_flight
 from mission.log.page.page import flight_page
 from mission.log.reader import Flight, read_flight
+from mission.operator import Wish
 from mission.plan_file import read_mission
 from mission.simulated.page_ground import page_ground
 from mission.simulated.scenario import Scenario
 from mission.simulated.virtual_flight import fly_virtually
+from tests.live.clients import until
+from tests.log import synthetic_flight
 from tests.page_browser.browser import Browser
 from tests.support.command_line import ROOT, lineflight
+from vision.records import VisionReport
 
 DESKTOP, PHONE = (1440, 1100), (500, 1100)  # the narrowest window that Chromium makes
 
@@ -162,3 +170,28 @@ def test_it_is_dark_where_people_want_it_dark(page: Path) -> None:
         draw_all(browser)
         assert browser.evaluate("getComputedStyle(document.body).backgroundColor") == "rgb(18, 22, 27)"
         keep(browser, "dark")
+
+
+def test_the_live_page_shows_the_flight_and_passes_on_a_confirmed_wish(browser: Browser) -> None:
+    with LiveFeed(LiveSettings(port=0, foxglove_port=0)) as feed:
+        feed.record(Briefing("follow_line", ("takeoff", "follow_lines")))
+        for _, item in itertools.islice(synthetic_flight.fly(), 12_000):
+            if not isinstance(item, Setpoint):
+                feed.record(item)
+            if isinstance(item, VisionReport) and item.jpeg is not None and item.estimate is not None:
+                break
+        browser.go(feed.url)
+        browser.wait_for("document.getElementById('camera') && document.getElementById('camera').width > 300")
+        canvas = "document.getElementById('camera')"
+        seen = "[...{0}.getContext('2d').getImageData(0, 0, {0}.width, {0}.height).data].some((v) => v > 0 && v < 255)"
+        browser.wait_for(seen.format(canvas))
+        keep(browser, f"live-{browser.evaluate('innerWidth')}")
+        buttons = "[...document.querySelectorAll('button')]"
+        browser.evaluate(f"{buttons}.find((b) => b.textContent.trim() === 'Hold' && b.offsetParent).click()")
+        assert feed.wishes() == []  # it asks once more
+        confirm = "[...document.querySelectorAll('dialog[open] button')].find((b) => /hold/i.test(b.textContent))"
+        browser.wait_for(f"{confirm} !== undefined")
+        browser.evaluate(f"{confirm}.click()")
+        assert until(feed.wishes) == [Wish.HOLD]
+    assert [error for error in browser.page.errors if "ERR_" not in error] == []
+    assert all(url.startswith((feed.url.split("#")[0], "data:", "blob:")) for url in browser.page.requests)
