@@ -36,6 +36,7 @@ from mission.records import (
     AutopilotTarget,
     ControlTick,
     Event,
+    FlightStart,
     MissionEnded,
     Origin,
     PreflightCheck,
@@ -205,6 +206,18 @@ class Executive:
         self._situation.begin(departure.memory)
         self._helm.start, self._helm.reference = departure.memory.start, departure.here
         self._flow.stand = departure.here
+        memory, start = departure.memory, departure.memory.start
+        self._log.record(
+            FlightStart(
+                self._clock.now_ns(),
+                start.north_m,
+                start.east_m,
+                start.down_m,
+                start.yaw_rad,
+                memory.theta_0_rad,
+                memory.move_until_m,
+            )
+        )
         if departure.origin is not None:
             place = departure.origin
             self._log.record(Origin(self._clock.now_ns(), place.latitude_rad, place.longitude_rad, place.altitude_m))

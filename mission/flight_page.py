@@ -1,5 +1,6 @@
 """The page of a flight, written to a file."""
 
+import contextlib
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -27,10 +28,16 @@ def write_page(log: Path, file: Path, report: FlightReport) -> Path:
 
 
 def write_text(file: Path, text: str) -> None:
-    """Write a page's text. Raises PageError."""
+    """Write a page's text, in place of an older page. Raises PageError; what stood there then stays."""
+    if file.suffix.lower() not in (".html", ".htm"):
+        raise PageError(f"A page's name ends in .html: {file} does not.")
+    part = file.with_name(file.name + ".part")
     try:
-        file.write_text(text, encoding="utf-8")
+        part.write_text(text, encoding="utf-8")
+        part.replace(file)
     except OSError as error:
+        with contextlib.suppress(OSError):
+            part.unlink(missing_ok=True)
         words = f"The page {file} cannot be written ({error.strerror}); name a file in a folder that can be written."
         raise PageError(words) from error
 

@@ -139,5 +139,5 @@ def _write(path: Path, text: str) -> None:
     try:
         write_text(path, text)
     except PageError as error:
-        fail(str(error), EXIT_FAILED_FILE)
+        fail(str(error), EXIT_BAD_INPUT if path.suffix.lower() not in (".html", ".htm") else EXIT_FAILED_FILE)
     sys.stderr.write(f"page     {path} ({len(text.encode()) / 1e6:.1f} MB)\n")

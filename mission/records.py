@@ -100,6 +100,23 @@ class Origin:
 
 
 @dataclass(frozen=True, slots=True)
+class FlightStart:
+    """Where the mission began, also that of a resumed flight: NED [m], yaw [rad], and what later tasks need of it.
+
+    `theta_0_rad` is the heading that move_until flies along; `move_until_m` how far a move_until before has flown
+    (None: none has).
+    """
+
+    t_ns: int
+    north_m: float
+    east_m: float
+    down_m: float
+    yaw_rad: float
+    theta_0_rad: float
+    move_until_m: float | None
+
+
+@dataclass(frozen=True, slots=True)
 class AutopilotTarget:
     """Where the autopilot said that it flies to (POSITION_TARGET_LOCAL_NED): NED [m], yaw [rad]."""
 

@@ -33,13 +33,13 @@ def print_comparison(comparison: Comparison, console: Console) -> None:
 
 def _task_line(comparison: Comparison, other: int, first: object, second: object) -> str | None:
     a, b = (getattr(task, "task", None) for task in (first, second))
+    first_log, other_log = comparison.names[0], comparison.names[other]
     if a is None or b is None:
-        name, log = (b, comparison.names[other]) if a is None else (a, comparison.names[0])
-        return f"only {log} flew {words_of(str(name))}"
+        flew, lacks, name = (other_log, first_log, b) if a is None else (first_log, other_log, a)
+        return f"{flew} flew {words_of(str(name))}, {lacks} did not"
     results = [str(getattr(task, "result", "")) for task in (first, second)]
     if results[0] == results[1]:
         return None
-    first_log, other_log = comparison.names[0], comparison.names[other]
     return f"{words_of(a)} {words_of(results[0])} in {first_log}, {words_of(results[1])} in {other_log}"
 
 

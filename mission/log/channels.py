@@ -24,6 +24,7 @@ from mission.records import (
     ClockSync,
     ControlTick,
     Event,
+    FlightStart,
     LineFix,
     MissionEnded,
     Origin,
@@ -79,6 +80,7 @@ class FoxgloveChannel:
 RECORD_CHANNELS = (
     RecordChannel("/mission", LoggedMission, "the mission file, and how log times belong to flight times", "once"),
     RecordChannel("/preflight/check", PreflightCheck, "what each check before arming found", "once each"),
+    RecordChannel("/mission/start", FlightStart, "where the mission began", "once"),
     RecordChannel("/vehicle/origin", Origin, "where on Earth the local frame lies", "once"),
     RecordChannel("/vehicle/state", VehicleState, "the vehicle as telemetry tells it", "every control tick"),
     RecordChannel(

@@ -32,6 +32,7 @@ from mission.records import (
     ClockSync,
     ControlTick,
     Event,
+    FlightStart,
     LineFix,
     MissionEnded,
     Origin,
@@ -72,6 +73,7 @@ class Flight:
     truth: tuple[TruePose, ...]
     line: TrueLine | None
     origin: Origin | None
+    start: FlightStart | None
     targets: tuple[AutopilotTarget, ...]
     ticks: tuple[ControlTick, ...]
     syncs: tuple[ClockSync, ...]
@@ -215,6 +217,7 @@ def _flight(
         truth=tuple(streams[TruePose]),
         line=lines[-1] if lines else None,
         origin=origins[-1] if origins else None,
+        start=streams[FlightStart][-1] if streams[FlightStart] else None,
         targets=tuple(streams[AutopilotTarget]),
         ticks=tuple(streams[ControlTick]),
         syncs=tuple(streams[ClockSync]),

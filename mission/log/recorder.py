@@ -128,6 +128,6 @@ class Recorder:
     def _write(self, log: McapLog, record: object) -> None:
         try:
             log.write(record)
-        except (KeyError, ValueError, TypeError) as error:
+        except Exception as error:  # whatever one record is, the others are worth keeping
             name = type(record).__name__
             self._fault = f"The log {self.path} lacks a {name} that it could not encode ({error})."

@@ -114,6 +114,8 @@ def _figures(report: FlightReport, width: int) -> Table:
         table.add_row("  setpoints while offboard", rate)
     if report.landing is not None:
         motors = "disarmed" if report.landing.is_disarmed else "still armed"
+        if report.is_truncated:
+            motors = "where the log ends"
         table.add_row("  at the end", f"{report.landing.distance_m:.2f} m from the start, {motors}")
     return table
 

@@ -24,11 +24,12 @@ class Spread:
 class EstimateDifferences:
     """Estimates held against those of the same frames.
 
-    Of `n` frames `n_same` gave the same to the bit, `n_only_now` show a line only now and `n_only_then` only then;
-    spreads are over frames that showed one both times, None where there are none.
+    `n_lacking` frames of before are not there now. Of `n` frames `n_same` gave the same to the bit, `n_only_now` show a
+    line only now and `n_only_then` only then; spreads are over frames that showed one both times, None without any.
     """
 
     n: int
+    n_lacking: int
     n_same: int
     n_only_now: int
     n_only_then: int
@@ -38,9 +39,13 @@ class EstimateDifferences:
 
 @dataclass(frozen=True, slots=True)
 class SetpointDifferences:
-    """Setpoints held against those of the same control ticks: their distances [m], and their yaws' [deg]."""
+    """Setpoints held against those of the same control ticks: their distances [m], and their yaws' [deg].
+
+    `n_lacking` ticks of before send none now.
+    """
 
     n: int
+    n_lacking: int
     n_same: int
     distance_m: Spread | None
     yaw_deg: Spread | None
@@ -57,8 +62,14 @@ class Differences:
     def beyond(self, tolerance: "Tolerance") -> tuple[str, ...]:
         """What differs by more than is allowed, in sentences."""
         estimates, setpoints = self.estimates, self.setpoints
+        if self.is_reference and not (estimates.n and setpoints.n):
+            return ("nothing of the reference is left to compare: no frame was seen, or no setpoint sent",)
         n_flipped = estimates.n_only_now + estimates.n_only_then
         found = []
+        if self.is_reference and estimates.n_lacking > tolerance.flipped_share * estimates.n:
+            found.append(f"{estimates.n_lacking} frames of the reference are not seen now")
+        if self.is_reference and setpoints.n_lacking > tolerance.flipped_share * setpoints.n:
+            found.append(f"{setpoints.n_lacking} setpoints of the reference are not sent now")
         if n_flipped > tolerance.flipped_share * estimates.n:
             found.append(f"{n_flipped} of {estimates.n} frames show a line only now or only then")
         for spread, limit, words in (
@@ -98,6 +109,7 @@ def estimate_differences(
     pairs = [(a, b) for a, b in both if a is not None and b is not None]
     return EstimateDifferences(
         n=len(both),
+        n_lacking=len(then.keys() - now.keys()),
         n_same=sum(a == b for a, b in both),
         n_only_now=sum(a is not None and b is None for a, b in both),
         n_only_then=sum(a is None and b is not None for a, b in both),
@@ -106,10 +118,11 @@ def estimate_differences(
     )
 
 
-def setpoint_differences(pairs: Sequence[tuple[Setpoint, Setpoint]]) -> SetpointDifferences:
+def setpoint_differences(pairs: Sequence[tuple[Setpoint, Setpoint]], n_lacking: int = 0) -> SetpointDifferences:
     """Hold setpoints against those of before."""
     return SetpointDifferences(
         n=len(pairs),
+        n_lacking=n_lacking,
         n_same=sum(a == b for a, b in pairs),
         distance_m=_spread(
             [math.dist((a.north_m, a.east_m, a.down_m), (b.north_m, b.east_m, b.down_m)) for a, b in pairs]

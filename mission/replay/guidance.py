@@ -9,7 +9,7 @@ from drivers.clock import NS_PER_S
 from mission.autopilot import Setpoint, VehicleState
 from mission.build import build_task, guidance_settings, setpoint_limits
 from mission.eyes import Lookout, Notice
-from mission.guidance import leash
+from mission.guidance import GuidanceSettings, leash
 from mission.log.reader import Flight
 from mission.log.records import SentSetpoint
 from mission.plan import MissionPlan
@@ -88,10 +88,8 @@ def replay_guidance(
     if not flight.states or not flight.ticks:
         return
     guidance, leash_m = guidance_settings(plan.guidance), setpoint_limits(plan).leash_m
-    first = flight.states[0]
-    start = Setpoint(first.north_m, first.east_m, first.down_m, first.yaw_rad)
-    theta_0_rad = first.yaw_rad if guidance.theta_0_rad is None else guidance.theta_0_rad
-    memory = FlightMemory(start, theta_0_rad)
+    memory = _memory(flight, guidance)
+    start = memory.start
     eyes = _ReplayedEyes(reports)
     lookout = Lookout(eyes, _Fixes(), camera, guidance)
     timeline = _Timeline(flight)
@@ -102,17 +100,17 @@ def replay_guidance(
         if state is None:
             continue
         eyes.now_ns = tick.t_ns
+        flown_index = timeline.task_at(tick.t_ns)
+        if flown_index != index:
+            index = flown_index
+            is_known = index is not None and index < len(plan.tasks)
+            task = build_task(plan.tasks[index], guidance, memory) if is_known and index is not None else None
         if not state.is_position_ok:
             memory.known_line.forget()
         memory.trail.add(state)
         sight = lookout.look(tick.t_ns, state, memory.known_line, start.down_m - state.down_m)
         if sight is not None and sight.found is not None:
             memory.line_seen_at = Setpoint(state.north_m, state.east_m, state.down_m, state.yaw_rad)
-        flown_index = timeline.task_at(tick.t_ns)
-        if flown_index != index:
-            index = flown_index
-            is_known = index is not None and index < len(plan.tasks)
-            task = build_task(plan.tasks[index], guidance, memory) if is_known and index is not None else None
         before, sent = timeline.setpoints_at(tick.t_ns)
         if task is None or before is None or timeline.is_paused_at(tick.t_ns):
             continue
@@ -127,22 +125,31 @@ class _Timeline:
     def __init__(self, flight: Flight) -> None:
         self._states = flight.states
         self._setpoints = flight.setpoints
-        self._starts = [(started.t_ns, started.index) for started in flight.tasks_started]
+        # A task that ends at the time at which the next one starts comes first.
+        ends: list[tuple[int, int | None]] = [(ended.t_ns, None) for ended in flight.tasks_ended]
+        starts: list[tuple[int, int | None]] = [(started.t_ns, started.index) for started in flight.tasks_started]
+        self._changes = sorted([*ends, *starts], key=lambda change: (change[0], change[1] is not None))
         self._pauses = _pauses(flight.events)
         self._ticks = [tick.t_ns for tick in flight.ticks] + [flight.end_ns + 1]
         self._state = self._setpoint = self._tick = -1
 
     def state_at(self, t_ns: int) -> VehicleState | None:
-        """The newest state that was there."""
+        """The state that the tick saw: each tick logs one, so they are paired by their order where none is missing.
+
+        Otherwise the newest one that was there.
+        """
+        if len(self._states) == len(self._ticks) - 1:
+            self._state += 1
+            return self._states[self._state]
         while self._state + 1 < len(self._states) and self._states[self._state + 1].t_ns <= t_ns:
             self._state += 1
         return self._states[self._state] if self._state >= 0 else None
 
     def task_at(self, t_ns: int) -> int | None:
-        """The task that ran when the tick began."""
+        """The task that ran when the tick began; one that started in a tick is flown from the next one on."""
         running = None
-        for start_ns, index in self._starts:
-            if start_ns <= t_ns:
+        for change_ns, index in self._changes:
+            if change_ns < t_ns:
                 running = index
         return running
 
@@ -182,3 +189,14 @@ def _pauses(events: Sequence[Event]) -> list[tuple[int, int]]:
 
 def _plain(sent: SentSetpoint) -> Setpoint:
     return Setpoint(sent.north_m, sent.east_m, sent.down_m, sent.yaw_rad)
+
+
+def _memory(flight: Flight, guidance: GuidanceSettings) -> FlightMemory:
+    """What tasks knew of the flight's beginning; older logs do not tell, and begin where the first state was."""
+    began = flight.start
+    if began is None:
+        first = flight.states[0]
+        start = Setpoint(first.north_m, first.east_m, first.down_m, first.yaw_rad)
+        return FlightMemory(start, first.yaw_rad if guidance.theta_0_rad is None else guidance.theta_0_rad)
+    start = Setpoint(began.north_m, began.east_m, began.down_m, began.yaw_rad)
+    return FlightMemory(start, began.theta_0_rad, began.move_until_m)

@@ -47,15 +47,20 @@ def replay(flight: Flight, on_frame: Callable[[], None] = lambda: None) -> Repla
 
 def differences(flight: Flight, replayed: Replay) -> Differences:
     """Hold a replay against the reference in the log, where there is one, else against the flight."""
+    n_lacking = 0
     now = {report.t_capture_ns: report.estimate for report in replayed.reports}
     if flight.reference_estimates:
         then = {estimate.t_ns: estimate.estimate for estimate in flight.reference_estimates}
         setpoints = {s.t_ns: Setpoint(s.north_m, s.east_m, s.down_m, s.yaw_rad) for s in flight.reference_setpoints}
         pairs = [(tick.replayed, setpoints[tick.t_ns]) for tick in replayed.ticks if tick.t_ns in setpoints]
+        n_lacking = len(setpoints) - len(pairs)
     else:
         then = {report.t_capture_ns: report.estimate for report in flight.reports}
         pairs = [(tick.replayed, tick.flown) for tick in replayed.ticks]
-    return Differences(bool(flight.reference_estimates), estimate_differences(now, then), setpoint_differences(pairs))
+        then = {t_ns: then[t_ns] for t_ns in flight.image_times_ns if t_ns in then}
+    return Differences(
+        bool(flight.reference_estimates), estimate_differences(now, then), setpoint_differences(pairs, n_lacking)
+    )
 
 
 def write_reference(flight: Flight, replayed: Replay, out: Path, tell: Callable[[float], None]) -> None:

@@ -23,7 +23,7 @@ from mission.log.disk import log_path
 from mission.log.recorder import Recorder
 from mission.logbook import FlightPapers, Logbook
 from mission.plan_file import MissionFile
-from mission.records import TruePose
+from mission.records import Event, Severity, TruePose
 from mission.reporting import Progress
 from mission.simulated.aftermath import Aftermath
 from mission.simulated.in_process import InProcessAutopilot
@@ -114,6 +114,9 @@ def fly_virtually(
                     await asyncio.gather(showing, return_exceptions=True)
                     await autopilot.close()
                 wall_s = time.monotonic() - began_s
+            touched = Aftermath(world, None, None if sim.witness is None else sim.witness.summary).contact
+            if touched is not None:
+                recorder.record(Event(clock.now_ns(), "contact", Severity.ERROR, touched))
             on_progress(executive.progress)
         return FlightOutcome(ended, executive.may_have_armed, path, recorder.failure), sim.boot_s / wall_s
 

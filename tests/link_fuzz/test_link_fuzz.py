@@ -12,7 +12,7 @@ from tests.link_fuzz.flight_through import Ended, fly_through
 from tests.link_fuzz.lies import strangers_lies, vehicles_lies
 
 OFFBOARD = 6  # PX4's main mode
-N_STREAMS = 11  # that MavsdkAutopilot subscribes to
+N_STREAMS = 12  # that MavsdkAutopilot subscribes to
 ONLY_THE_VEHICLE_TELLS = {
     Hazard.TAKEOVER,
     Hazard.AUTOPILOT_FAILSAFE,

@@ -17,6 +17,7 @@ from mission.records import (
     ClockSync,
     ControlTick,
     Event,
+    FlightStart,
     LineFix,
     MissionEnded,
     Origin,
@@ -52,6 +53,7 @@ TASKS = (
 )
 
 CAMERA = Intrinsics(WIDTH_PX, HEIGHT_PX, FOCAL_PX, FOCAL_PX, 319.5, 239.5)
+START = FlightStart(START_NS, 0.0, 0.0, 0.0, 0.0, 0.0, None)
 ORIGIN = Origin(START_NS, math.radians(47.4), math.radians(8.5), 488.0)
 PARAMETERS = Attachment("parameters.json", "application/json", b'{"MPC_XY_P": 0.95}')
 LINE = TrueLine(
@@ -73,6 +75,7 @@ def fly(*, image_period_s: float = 4.0) -> Iterator[tuple[int, object]]:
     yield t_ns, CAMERA
     yield t_ns, PARAMETERS
     yield t_ns, ORIGIN
+    yield t_ns, START
     for index, (task, is_offboard, goal, duration_s) in enumerate(TASKS):
         yield t_ns, TaskStarted(t_ns, index, task)
         first, goal_pose = pose, np.array([*goal[:3], math.radians(goal[3])])

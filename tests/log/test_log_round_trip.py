@@ -55,6 +55,7 @@ from tests.log.synthetic_flight import (
     MISSION_TEXT,
     ORIGIN,
     PARAMETERS,
+    START,
     START_NS,
     TICK_NS,
     FixedClock,
@@ -95,6 +96,7 @@ def test_every_record_comes_back_as_it_was(flown: list[tuple[int, object]], log:
     assert flight.ticks == of_type(flown, ControlTick)
     assert flight.syncs == of_type(flown, ClockSync)
     assert flight.origin == ORIGIN
+    assert flight.start == START
     assert flight.attachments == {PARAMETERS.name: PARAMETERS.data}
     assert set(flight.targets) < set(of_type(flown, AutopilotTarget))  # thinned to 10 Hz
     assert len(flight.targets) == pytest.approx(len(of_type(flown, AutopilotTarget)) / 2, rel=0.05)
@@ -138,7 +140,9 @@ def test_the_log_holds_the_channels_of_the_table_with_their_schemas(log: Path) -
         summary = make_reader(file).get_summary()
     assert summary is not None
     found = {channel.topic: summary.schemas[channel.schema_id] for channel in summary.channels.values()}
-    imported = {channel.topic for channel in channels.RECORD_CHANNELS if channel.topic.startswith("/imported/")}
+    imported = {
+        channel.topic for channel in channels.RECORD_CHANNELS if channel.topic.startswith(("/imported/", "/replayed/"))
+    }
     unused = {"/status_text", "/preflight/check", "/log/health", *imported}
     for channel in channels.RECORD_CHANNELS:
         if channel.topic not in unused:

@@ -9,7 +9,9 @@ import pytest
 
 from mission.ending import EXIT_BAD_INPUT, EXIT_DIFFERENT, EXIT_FAILED_FILE
 from mission.log.reader import Flight, read_flight
+from mission.plan import MissionPlan
 from mission.replay.differences import Tolerance, estimate_differences, setpoint_differences
+from mission.replay.guidance import replay_guidance
 from mission.replay.replay import Replay, differences, replay, write_reference
 from tests.log.synthetic_flight import fly, write_log
 from tests.replay.golden import GOLDEN
@@ -41,14 +43,33 @@ def test_on_one_computer_two_replays_are_the_same_to_the_bit(golden: Flight, rep
     assert again.ticks == replayed.ticks
 
 
+def test_with_the_flights_own_estimates_every_setpoint_is_the_same_to_the_bit(golden: Flight) -> None:
+    """Guidance alone: no tick is paired with another task, state or report than its own."""
+    assert golden.camera is not None
+    plan = MissionPlan.model_validate_json(golden.attachments["plan.json"])
+    told = sorted(golden.reports, key=lambda report: report.t_capture_ns + report.latency_ns)
+    ticks = list(replay_guidance(golden, plan, golden.camera, told))
+    assert len(ticks) > 300
+    assert {tick.task for tick in ticks} == {"takeoff", "ascend", "move_until", "align", "follow_lines"}
+    assert [tick.t_ns for tick in ticks if tick.replayed != tick.flown] == []
+
+
 def test_the_replay_is_near_to_what_was_flown(golden: Flight, replayed: Replay) -> None:
     bare = replace(golden, reference_estimates=(), reference_setpoints=())
     found = differences(bare, replayed)
     assert not found.is_reference
     assert found.setpoints.distance_m is not None
-    assert found.setpoints.distance_m.p95 < 0.02  # JPEG is what the frames have gone through since
+    assert found.setpoints.distance_m.p95 < 0.01  # JPEG is what the frames have gone through since
     assert found.estimates.angle_deg is not None
     assert found.estimates.angle_deg.p95 < 0.1
+
+
+def test_a_reference_of_which_nothing_is_left_does_not_pass(golden: Flight, replayed: Replay) -> None:
+    (words,) = differences(golden, Replay((), ())).beyond(Tolerance())
+    assert "nothing of the reference is left" in words
+    half = replace(replayed, ticks=replayed.ticks[::2])
+    found = differences(golden, half).beyond(Tolerance())
+    assert any("setpoints of the reference are not sent now" in words for words in found)
 
 
 def test_vision_that_has_changed_is_told(golden: Flight, replayed: Replay) -> None:

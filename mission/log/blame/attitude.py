@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.clock import NS_PER_S
-from mission.log.blame.leg import Leg
+from mission.log.blame.leg import GROWTH_S, Leg
 from mission.log.blame.records import Culprit, Excursion, Fault, Kind, Limits
 from mission.log.blame.signals import Motion
 from mission.log.blame.spans import spans
@@ -29,7 +29,13 @@ def off_height(leg: Leg, limits: Limits) -> Iterator[Excursion]:
         tilt_rad = float(motion.tilt_rad[inside].max())
         is_tilted = tilt_rad > TILT_LIMIT_RAD
         words = [f"{abs(below_m[peak]):.2f} m {'below' if below_m[peak] > 0 else 'above'} its setpoint"]
-        if is_tilted:
+        culprit, fault = Culprit.AUTOPILOT, Fault.TRACKING
+        moved_m = _setpoint_moved_m(motion, peak, math.copysign(1.0, below_m[peak]))
+        if moved_m > 0.5 * abs(below_m[peak]):
+            culprit, fault = Culprit.EXECUTIVE, Fault.SETPOINT
+            words.append(f"the setpoint went {moved_m:.2f} m away from it, and it came behind")
+        elif is_tilted and below_m[peak] > 0:
+            culprit, fault = Culprit.WIND, Fault.PUSHED
             words.append(
                 f"it was tilted by {math.degrees(tilt_rad):.0f} degrees against the wind, and its thrust had to do both"
             )
@@ -41,11 +47,19 @@ def off_height(leg: Leg, limits: Limits) -> Iterator[Excursion]:
             end_ns,
             float(abs(below_m[peak])),
             "m",
-            Culprit.WIND if is_tilted else Culprit.AUTOPILOT,
-            Fault.PUSHED if is_tilted else Fault.TRACKING,
+            culprit,
+            fault,
             {},
             tuple(words),
         )
+
+
+def _setpoint_moved_m(motion: Motion, peak: int, side: float) -> float:
+    """By how much the setpoint's height went away from the vehicle, at most, in the seconds before `peak` [m]."""
+    first = int(np.searchsorted(motion.t_ns, motion.t_ns[peak] - round(GROWTH_S * NS_PER_S)))
+    heights_m = motion.setpoint_m[first : peak + 1, 2]
+    heights_m = heights_m[np.isfinite(heights_m)]
+    return float((side * (heights_m - heights_m[-1])).max()) if heights_m.size else 0.0
 
 
 def off_heading(leg: Leg, limits: Limits) -> Iterator[Excursion]:

@@ -11,7 +11,7 @@ from drivers.clock import NS_PER_S
 Floats = NDArray[np.float64]
 Times = NDArray[np.int64]
 
-_LAGS_S = np.arange(0.0, 1.01, 0.02)
+_LAGS_S = np.arange(-50, 51) / 50.0
 _LEAST_LAG_S = 0.1
 _LEAST_MOTION = 0.008  # what the slopes scatter by at no lag: less tells nothing
 _EXPLAINS = 0.65  # of that scatter may be left at the best lag
@@ -21,7 +21,7 @@ _DRIFT_S = 4.0
 
 @dataclass(frozen=True, slots=True)
 class ImageLag:
-    """The frames show where the vehicle was `lag_s` [s] before the time that they bear.
+    """The frames show where the vehicle was `lag_s` [s] before the time that they bear; negative: after it.
 
     With that taken into account the line's scatter is `residual` of what it was.
     """
@@ -51,9 +51,10 @@ def image_lag(frame_ns: Times, image_slope: Floats, state_ns: Times, expected: F
     scatters = np.array([_scatter(frame_ns, image_slope, state_ns, expected, lag_s) for lag_s in _LAGS_S.tolist()])
     best = int(scatters.argmin())
     lag_s = float(_LAGS_S[best])
-    if scatters[0] < _LEAST_MOTION or lag_s < _LEAST_LAG_S or scatters[best] > _EXPLAINS * scatters[0]:
+    now = float(scatters[len(_LAGS_S) // 2])
+    if now < _LEAST_MOTION or abs(lag_s) < _LEAST_LAG_S or scatters[best] > _EXPLAINS * now:
         return None
-    return ImageLag(lag_s, float(scatters[best] / scatters[0]))
+    return ImageLag(lag_s, float(scatters[best] / now))
 
 
 def _scatter(frame_ns: Times, image_slope: Floats, state_ns: Times, expected: Floats, lag_s: float) -> float:

@@ -30,6 +30,7 @@ class Leg:
     `lag` is how late the frames' times are, where they are, `depth_m` how far below the line was in the median. `view`
     tells at each sample how far from the middle of the picture the line must have been, 1 at its edge; None where the
     height over it or the camera is not known. `motors` are what they were told, where the autopilot's own log is there.
+    `placed_ns` are the times of the frames that told the line's place.
     """
 
     task: str
@@ -43,6 +44,7 @@ class Leg:
     depth_m: float | None
     view: Floats | None
     motors: tuple[ImportedActuators, ...]
+    placed_ns: frozenset[int]
 
     @property
     def has_estimates(self) -> bool:
@@ -67,7 +69,10 @@ def leg_of(flight: Flight, whole: Motion, known: Knowledge, span: TaskSpan) -> L
         view = np.nan_to_num(np.abs(slope)) * 2.0 * camera.fx_px / camera.width_px
     own = () if flight.imported is None else flight.imported.actuators
     motors = tuple(told for told in own if span.start_ns <= told.t_ns <= end_ns)
-    return Leg(span.task, span.start_ns, end_ns, motion, lateral, is_flown, reports, lag, depth_m, view, motors)
+    placed_ns = frozenset(fix.t_ns for fix in flight.fixes if fix.is_placed and span.start_ns <= fix.t_ns <= end_ns)
+    return Leg(
+        span.task, span.start_ns, end_ns, motion, lateral, is_flown, reports, lag, depth_m, view, motors, placed_ns
+    )
 
 
 def _lag(camera: Intrinsics, t_ns: Times, slope: Floats, reports: tuple[VisionReport, ...]) -> ImageLag | None:

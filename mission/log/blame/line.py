@@ -20,33 +20,40 @@ def off_line(leg: Leg, limits: Limits) -> Iterator[Excursion]:
     """Where the vehicle flew beside the line."""
     lateral = leg.lateral
     off_m = np.where(leg.is_flown, np.nan_to_num(lateral.off_m), 0.0)
-    for start_ns, end_ns in spans(lateral.t_ns, np.abs(off_m) > limits.off_line_m, limits.least_s):
-        is_in = (lateral.t_ns >= start_ns) & (lateral.t_ns <= end_ns)
-        inside = np.flatnonzero(is_in)
-        peak = int(inside[np.abs(off_m[inside]).argmax()])
-        side = math.copysign(1.0, off_m[peak])
+    # A swing to one side and then to the other are two.
+    found = [
+        (side, *span)
+        for side in (1.0, -1.0)
+        for span in spans(lateral.t_ns, side * off_m > limits.off_line_m, limits.least_s)
+    ]
+    for side, start_ns, end_ns in sorted(found, key=lambda one: one[1]):
+        inside = np.flatnonzero((lateral.t_ns >= start_ns) & (lateral.t_ns <= end_ns))
+        peak = int(inside[(side * off_m[inside]).argmax()])
         beyond = inside[side * off_m[inside] > limits.off_line_m]
+        known = beyond[np.isfinite(lateral.tracking_m[beyond]) & np.isfinite(lateral.executive_m[beyond])]
         shares = {
-            "perception": _mean(side * lateral.perception_m[beyond]),
-            "executive": _mean(side * lateral.executive_m[beyond]),
-            "tracking": _mean(side * lateral.tracking_m[beyond]),
+            "perception": _mean(side * lateral.perception_m[known]),
+            "executive": _mean(side * lateral.executive_m[known]),
+            "tracking": _mean(side * lateral.tracking_m[known]),
         }
         largest = max(shares, key=lambda name: shares[name])
-        if largest == "perception" or not math.isfinite(shares["tracking"]):
-            culprit, fault, evidence = of_perception(leg, start_ns, end_ns, beyond)
+        if not known.size:
+            culprit, fault, evidence = _of_nothing(leg, start_ns, end_ns, beyond)
+        elif largest == "perception":
+            culprit, fault, evidence = of_perception(leg, start_ns, end_ns, known)
         elif largest == "executive":
             culprit, fault, evidence = _of_executive(leg, start_ns, end_ns, shares["executive"])
         else:
             culprit, fault, evidence = of_tracking(leg.motion, lateral, peak, side)
         words = "right" if side > 0 else "left"
-        known = "" if lateral.is_true else " as it was known"
+        as_known = "" if lateral.is_true else " as it was known"
         parts = {
             "the line elsewhere than told": shares["perception"],
             "the setpoint off the line as told": shares["executive"],
             "the vehicle off its setpoint": shares["tracking"],
         }
         made_of = ", ".join(f"{name} {part:+.2f} m" for name, part in parts.items() if math.isfinite(part))
-        first = f"{abs(off_m[peak]):.2f} m to the {words} of the line{known}"
+        first = f"{abs(off_m[peak]):.2f} m to the {words} of the line{as_known}"
         if made_of:
             first += f"; while beyond the limit, in the mean: {made_of}"
         yield Excursion(
@@ -61,6 +68,15 @@ def off_line(leg: Leg, limits: Limits) -> Iterator[Excursion]:
             {name: round(value, 3) for name, value in shares.items() if math.isfinite(value)},
             (first, *evidence),
         )
+
+
+def _of_nothing(
+    leg: Leg, start_ns: int, end_ns: int, beyond: NDArray[np.intp]
+) -> tuple[Culprit, Fault, tuple[str, ...]]:
+    """Nothing can be divided: the line was not told, or nothing was sent."""
+    if np.isfinite(leg.lateral.age_s[beyond]).any():
+        return Culprit.EXECUTIVE, Fault.SETPOINT, ("no setpoint was sent meanwhile",)
+    return of_perception(leg, start_ns, end_ns, beyond)
 
 
 def _of_executive(leg: Leg, start_ns: int, end_ns: int, share_m: float) -> tuple[Culprit, Fault, tuple[str, ...]]:
@@ -89,13 +105,13 @@ def unseen(leg: Leg, limits: Limits) -> Iterator[Excursion]:
 
 def misdated(leg: Leg, limits: Limits) -> Iterator[Excursion]:
     """A leg whose frames bear other times than those at which they were taken."""
-    if leg.lag is not None and leg.lag.lag_s > limits.misdated_s:
+    if leg.lag is not None and abs(leg.lag.lag_s) > limits.misdated_s:
         yield Excursion(
             Kind.MISDATED,
             leg.task,
             leg.start_ns,
             leg.end_ns,
-            leg.lag.lag_s,
+            abs(leg.lag.lag_s),
             "s",
             Culprit.PERCEPTION,
             Fault.LATE,

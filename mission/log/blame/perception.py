@@ -1,5 +1,6 @@
 """What perception told of the line: wrong, late, or not at all."""
 
+import itertools
 import math
 
 import numpy as np
@@ -14,6 +15,7 @@ from mission.log.blame.tracking import of_tracking
 _OLD_S = 0.3  # latency over which an estimate is late
 _GONE_SHARE = 0.5  # of an excursion, without news of the line
 _NEWS_S = 0.5
+_GAP_S = 0.7  # between frames: the slowest camera that may fly gives more
 _VIEW_SHARE = 0.85  # of half the picture's width: further out a line is too short to be found
 _OUT_OF_VIEW_SHARE = 0.3  # of the time unseen, in which the line was out of the picture
 
@@ -25,9 +27,10 @@ def lateness(leg: Leg, start_ns: int, end_ns: int) -> str | None:
 
 def lag_words(lag: ImageLag) -> str:
     """What wrong times show in, in a sentence."""
+    when = "before" if lag.lag_s > 0 else "after"
     return (
-        f"frames show where the vehicle was {lag.lag_s * 1e3:.0f} ms before the time that they bear: with that the "
-        f"line scatters by {100 * lag.residual:.0f} % of what it does without"
+        f"frames show where the vehicle was {abs(lag.lag_s) * 1e3:.0f} ms {when} the time that they bear: with that "
+        f"the line scatters by {100 * lag.residual:.0f} % of what it does without"
     )
 
 
@@ -41,7 +44,7 @@ def of_perception(
     if late is not None:
         return Culprit.PERCEPTION, Fault.LATE, (late,)
     if not np.isfinite(age_s).any() or float((~(age_s <= _NEWS_S)).mean()) > _GONE_SHARE:
-        return Culprit.PERCEPTION, Fault.MISSING, _unseen_words(leg, start_ns, end_ns)
+        return Culprit.PERCEPTION, *_missing(leg, start_ns, end_ns)
     error_m = lateral.perception_m[beyond]
     middle_m = float(np.nanmedian(error_m))
     spread_m = float(np.nanpercentile(np.abs(error_m - middle_m), 90))
@@ -70,22 +73,26 @@ def of_unseen(leg: Leg, start_ns: int, end_ns: int) -> tuple[Culprit, Fault, tup
         side = math.copysign(1.0, leg.lateral.tracking_m[peak])
         culprit, fault, evidence = of_tracking(leg.motion, leg.lateral, peak, side)
         return culprit, fault, ("the vehicle was so far aside and so tilted that the line left the picture", *evidence)
-    return Culprit.PERCEPTION, Fault.MISSING, _unseen_words(leg, start_ns, end_ns)
+    return Culprit.PERCEPTION, *_missing(leg, start_ns, end_ns)
 
 
-def _unseen_words(leg: Leg, start_ns: int, end_ns: int) -> tuple[str, ...]:
+def _missing(leg: Leg, start_ns: int, end_ns: int) -> tuple[Fault, tuple[str, ...]]:
     """Why there was no line: no frames, frames that cannot be looked at, frames without it, or with another one."""
-    reports = [report for report in leg.reports if start_ns <= report.t_capture_ns <= end_ns]
-    if not reports:
-        return ("no frame came through vision",)
+    reports = [report for report in leg.reports if start_ns < report.t_capture_ns <= end_ns]
+    reports = [report for report in reports if report.t_capture_ns not in leg.placed_ns]  # those showed it
+    times_ns = [start_ns, *(report.t_capture_ns for report in reports), end_ns]
+    gap_s = max(after - before for before, after in itertools.pairwise(times_ns)) / NS_PER_S
+    if gap_s > _GAP_S:
+        return Fault.MISSING, (f"no frame came through vision for {gap_s:.1f} s",)
     troubles = [str(report.trouble) for report in reports if report.trouble is not None]
     n_seen = sum(report.estimate is not None for report in reports)
     words = [f"{n_seen} of {len(reports)} frames showed a line"]
     if troubles:
         words.append(f"{len(troubles)} frames were {max(set(troubles), key=troubles.count)}")
     if n_seen > 0.5 * len(reports):
-        words.append("what they showed could not be the line that was followed")
-    return tuple(words)
+        words.append("what they showed could not be the line that was followed: a road, a fence, another line")
+        return Fault.WRONG, tuple(words)
+    return Fault.MISSING, tuple(words)
 
 
 def _latency(leg: Leg, start_ns: int, end_ns: int) -> str | None:

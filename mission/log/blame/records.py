@@ -62,8 +62,8 @@ class Limits:
 class Excursion:
     """One excursion: from `start_ns` to `end_ns` [flight], at most `peak` in `unit`, in `task`.
 
-    `shares` says how much of the peak came from where, in `unit`, positive where it made the excursion larger; empty
-    where there is nothing to divide. `evidence` are sentences for a person.
+    `shares` says how much came from where, in `unit`, in the mean while beyond the limit, positive where it made the
+    excursion larger; empty where there is nothing to divide. `evidence` are sentences for a person.
     """
 
     kind: Kind

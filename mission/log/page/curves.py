@@ -20,6 +20,7 @@ Seconds = Callable[[Sequence[int]], Floats]
 
 _CURVE_POINTS = 1_600
 _NEAR_LINE_M = 6.0
+_GAP_S = 1.0
 
 
 def listed(values: Floats, digits: int = 3) -> list[float | None]:
@@ -72,8 +73,11 @@ def flight_curves(flight: Flight, motion: Motion, start_ns: int) -> dict[str, An
         curves["height_over_line"] = _curve(s(times_ns), over_m)
     depths = [fix for fix in flight.fixes if fix.depth_m is not None]
     if depths:
+        times_s = s([fix.t_ns for fix in depths])
+        depths_m = np.array([fix.depth_m for fix in depths], dtype=np.float64)
+        gaps = np.flatnonzero(np.diff(times_s) > _GAP_S) + 1  # nothing was known in between
         curves["height_over_line_known"] = _curve(
-            s([fix.t_ns for fix in depths]), np.array([fix.depth_m for fix in depths], dtype=np.float64)
+            np.insert(times_s, gaps, times_s[gaps]), np.insert(depths_m, gaps, np.nan)
         )
     return {name: curve for name, curve in curves.items() if any(value is not None for value in curve["y"])}
 
@@ -101,7 +105,7 @@ def _has_any(lateral: Lateral) -> bool:
 
 
 def _vision_curves(flight: Flight, s: Seconds) -> dict[str, Any]:
-    estimates = [report.estimate for report in flight.reports if report.estimate is not None]
+    estimates = [report.estimate for report in flight.reports]
     curves = {
         "latency_ms": _curve(
             s([report.t_capture_ns for report in flight.reports]),
@@ -109,10 +113,12 @@ def _vision_curves(flight: Flight, s: Seconds) -> dict[str, Any]:
             1,
         )
     }
-    if estimates:
-        times_s = s([estimate.t_capture_ns for estimate in estimates])
-        curves["angle_deg"] = _curve(times_s, np.degrees([estimate.angle_rad for estimate in estimates]), 2)
-        curves["offset_px"] = _curve(times_s, np.array([estimate.offset_px for estimate in estimates]), 1)
+    if any(estimate is not None for estimate in estimates):
+        times_s = s([report.t_capture_ns for report in flight.reports])
+        angles_rad = _numbers([None if estimate is None else estimate.angle_rad for estimate in estimates])
+        curves["angle_deg"] = _curve(times_s, np.degrees(angles_rad), 2)
+        offsets_px = _numbers([None if estimate is None else estimate.offset_px for estimate in estimates])
+        curves["offset_px"] = _curve(times_s, offsets_px, 1)
     return curves
 
 

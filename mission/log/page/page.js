@@ -58,7 +58,7 @@
     $("result").textContent = words(report.result);
     $("result").classList.add(tone);
     $("reason").textContent = report.reason;
-    $("begun").textContent = `${flight.begun} · ${clock(report.duration_s)} min · ${report.tasks.length} tasks`;
+    $("begun").textContent = `${flight.begun} · ${clock(report.duration_s)} · ${report.tasks.length} tasks`;
     $("log").textContent = flight.log;
     $("mission").textContent = flight.mission_text;
     const tiles = [];
@@ -68,7 +68,10 @@
     } else if (report.legs.length) tiles.push([`${report.legs[0].avg_error_m.toFixed(2)} m`, "from a straight line"]);
     if (report.yaw_error) tiles.push([`${report.yaw_error.median_deg.toFixed(1)}°`, "median heading error"]);
     if (report.vision.latency_ms) tiles.push([`${report.vision.latency_ms.p50.toFixed(0)} ms`, "frame to estimate"]);
-    if (report.landing) tiles.push([`${report.landing.distance_m.toFixed(2)} m`, "landed from the start"]);
+    if (report.landing) {
+      const where = report.is_truncated ? "from the start, where the log ends" : report.landing.is_disarmed ? "landed from the start" : "from the start, still armed";
+      tiles.push([`${report.landing.distance_m.toFixed(2)} m`, where]);
+    }
     for (const [figure, what] of tiles) $("tiles").append(make("div", { class: "tile" }, make("b", {}, figure), make("span", {}, what)));
   }
 
@@ -95,7 +98,7 @@
         shares,
         make("ul", {}, ...trouble.evidence.map((line) => make("li", {}, line)))));
     }
-    if (!report.excursions.length && report.tasks.some((task) => task.task === "follow_lines")) {
+    if (!report.excursions.length && report.result === "completed" && report.tasks.some((task) => task.task === "follow_lines")) {
       $("blame").append(make("p", { class: "dim" }, "Nothing went beyond its limits while the line was followed."));
     }
   }

@@ -15,9 +15,9 @@ def evenly(n: int, most: int) -> Indices:
 
 
 def extremes(values: Floats, most: int) -> Indices:
-    """At most `most` indices of a rough signal (n,) that keep its peaks: of each stretch the lowest and the highest.
+    """At most 1.5 times `most` indices of a rough signal (n,): of each stretch the lowest and the highest.
 
-    NaN counts as nothing; a stretch of NaN alone keeps its first, so that a gap stays one.
+    NaN counts as nothing; of a stretch that has one the first is kept, too, so that a gap stays one.
     """
     n = len(values)
     if n <= most:
@@ -28,8 +28,9 @@ def extremes(values: Floats, most: int) -> Indices:
         part = values[first:last]
         if not part.size:
             continue
-        if np.isnan(part).all():
-            kept.append(first)
-        else:
+        gaps = np.flatnonzero(np.isnan(part))
+        if gaps.size:
+            kept.append(first + int(gaps[0]))
+        if gaps.size < part.size:
             kept.extend((first + int(np.nanargmin(part)), first + int(np.nanargmax(part))))
     return np.unique(np.array(kept, dtype=np.intp))
