@@ -4,7 +4,7 @@ import enum
 from dataclasses import dataclass
 from typing import Any
 
-from pydantic import TypeAdapter
+from pydantic import TypeAdapter, ValidationError
 
 from drivers.clock import NS_PER_S
 from drivers.mcap_stream import IMAGE_TOPIC
@@ -166,8 +166,19 @@ _ADAPTERS: dict[type, TypeAdapter[Any]] = {channel.record: TypeAdapter(channel.r
 
 
 def encode(record: object) -> bytes:
-    """Turn a record of the table into JSON, its fields as keys."""
-    return _ADAPTERS[type(record)].dump_json(record)
+    """Turn a record of the table into JSON, its fields as keys.
+
+    Raises ValueError for a number that JSON does not have (NaN, infinity): as null it could not be read back.
+    """
+    adapter = _ADAPTERS[type(record)]
+    body = adapter.dump_json(record)
+    if b"null" in body:
+        try:
+            adapter.validate_json(body)
+        except ValidationError as error:
+            where = ".".join(map(str, error.errors()[0]["loc"]))
+            raise ValueError(f"its {where} is no finite number") from None
+    return body
 
 
 def decode(topic: str, body: bytes) -> Any:

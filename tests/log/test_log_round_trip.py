@@ -1,6 +1,7 @@
 """What is recorded is read back: every record type, damaged and cut files, and disks that fail."""
 
 import hashlib
+import math
 import os
 import random
 import subprocess
@@ -143,7 +144,7 @@ def test_the_log_holds_the_channels_of_the_table_with_their_schemas(log: Path) -
     imported = {
         channel.topic for channel in channels.RECORD_CHANNELS if channel.topic.startswith(("/imported/", "/replayed/"))
     }
-    unused = {"/status_text", "/preflight/check", "/log/health", *imported}
+    unused = {"/status_text", "/preflight/check", *imported}
     for channel in channels.RECORD_CHANNELS:
         if channel.topic not in unused:
             assert found[channel.topic].encoding == "jsonschema"
@@ -298,6 +299,15 @@ def test_a_record_that_cannot_be_logged_is_a_failure_and_the_rest_is_kept(tmp_pa
     recorder = write_log(tmp_path / "a.mcap", [(0, object()), (0, event)])
     assert recorder.failure is not None
     assert "object" in recorder.failure
+    assert read_flight(tmp_path / "a.mcap").events == (event,)
+
+
+@pytest.mark.parametrize("value", [math.nan, math.inf])
+def test_a_number_that_json_lacks_is_a_failure_and_the_rest_can_be_read(tmp_path: Path, value: float) -> None:
+    event = Event(START_NS, "x", Severity.INFO, "y")
+    recorder = write_log(tmp_path / "a.mcap", [(0, TruePose(START_NS, value, 0.0, 0.0, 0.0)), (0, event)])
+    assert recorder.failure is not None
+    assert "lacks a TruePose that it could not encode (its north_m is no finite number)" in recorder.failure
     assert read_flight(tmp_path / "a.mcap").events == (event,)
 
 
