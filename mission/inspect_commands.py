@@ -74,7 +74,8 @@ def compare(
     if as_json:
         typer.echo(json.dumps(comparison.to_json() | {"failures": failures}))
     else:
-        print_comparison(comparison, Console())
+        # Into a file there is no terminal whose width would cut figures off.
+        print_comparison(comparison, Console(width=None if sys.stdout.isatty() else 200))
     if html is not None:
         from mission.compare.page import comparison_page
 

@@ -10,7 +10,11 @@ from mission.log.wording import words_of
 
 
 def print_comparison(comparison: Comparison, console: Console) -> None:
-    """Print every figure that any of the flights has, and the tasks whose results differ or that only one has flown."""
+    """Print how each flight ended, every figure that any has, and the tasks whose results differ or that one lacks."""
+    for name, report in zip(comparison.names, comparison.reports, strict=True):
+        console.print(Text(f"{name}: {report.mission}, {words_of(report.result)}: {report.reason}"))
+    if len({report.mission for report in comparison.reports}) > 1:
+        console.print(Text("These are different missions.", style="yellow"))
     table = Table(box=SIMPLE_HEAD, title="Figures", title_justify="left", title_style="bold")
     table.add_column("figure", no_wrap=True)
     for name in comparison.names:

@@ -19,12 +19,27 @@ class CopyError(Exception):
     """The new log cannot be written; the message is one sentence for a person."""
 
 
-def write_copy(source: Path, out: Path, records: Iterable[tuple[int, object]], tell: Callable[[float], None]) -> None:
+Change = Callable[[str, int, bytes], bytes | None]
+"""(topic, log time [ns, Unix], message) -> the message that is written instead; None: none is."""
+
+
+def unchanged(topic: str, log_time_ns: int, message: bytes) -> bytes | None:
+    """Leave a message as it is."""
+    return message
+
+
+def write_copy(
+    source: Path,
+    out: Path,
+    records: Iterable[tuple[int, object]],
+    tell: Callable[[float], None],
+    change: Change = unchanged,
+) -> None:
     """Write `out`: every schema, channel, message, attachment and metadata of the log `source`, and `records` between.
 
-    `records` are records of mission.log.channels with their log times [ns, Unix], in the order of these. `tell` hears
-    how much of `source` has been read, 0 to 1. What stands under `out` is whole: it is written under another name
-    first.
+    Messages go through `change` on their way. `records` are records of mission.log.channels with their log times [ns,
+    Unix], in the order of these. `tell` hears how much of `source` has been read, 0 to 1. What stands under `out` is
+    whole: it is written under another name first.
     Raises CopyError when it exists or cannot be written, LogError when `source` cannot be read.
     """
     if out.exists():
@@ -33,7 +48,7 @@ def write_copy(source: Path, out: Path, records: Iterable[tuple[int, object]], t
     try:
         with part.open("xb") as file:
             try:
-                _copy(_records(source, tell), Writer(file), iter(records))
+                _copy(_records(source, tell), Writer(file), iter(records), change)
                 file.flush()
                 os.fsync(file.fileno())
                 part.rename(out)
@@ -60,9 +75,12 @@ def _records(source: Path, tell: Callable[[float], None]) -> Iterator[McapRecord
         raise LogError(f"The log {source} cannot be read ({error.strerror}); is its disk still there?") from error
 
 
-def _copy(originals: Iterator[McapRecord], writer: Writer, records: Iterator[tuple[int, object]]) -> None:
+def _copy(
+    originals: Iterator[McapRecord], writer: Writer, records: Iterator[tuple[int, object]], change: Change
+) -> None:
     schema_ids = {0: 0}  # 0: a channel without a schema
     channel_ids: dict[int, int] = {}
+    topics: dict[int, str] = {}
     added = _Added(writer)
     waiting = next(records, None)
     for record in originals:
@@ -72,6 +90,7 @@ def _copy(originals: Iterator[McapRecord], writer: Writer, records: Iterator[tup
         elif isinstance(record, Schema) and record.id not in schema_ids:
             schema_ids[record.id] = writer.register_schema(record.name, record.encoding, record.data)
         elif isinstance(record, Channel) and record.id not in channel_ids:
+            topics[record.id] = record.topic
             channel_ids[record.id] = writer.register_channel(
                 record.topic, record.message_encoding, schema_ids[record.schema_id], record.metadata
             )
@@ -83,9 +102,11 @@ def _copy(originals: Iterator[McapRecord], writer: Writer, records: Iterator[tup
             while waiting is not None and waiting[0] <= record.log_time:
                 added.write(*waiting)
                 waiting = next(records, None)
-            writer.add_message(
-                channel_ids[record.channel_id], record.log_time, record.data, record.publish_time, record.sequence
-            )
+            data = change(topics[record.channel_id], record.log_time, record.data)
+            if data is not None:
+                writer.add_message(
+                    channel_ids[record.channel_id], record.log_time, data, record.publish_time, record.sequence
+                )
     while waiting is not None:
         added.write(*waiting)
         waiting = next(records, None)

@@ -34,4 +34,4 @@ def print_differences(found: Differences, beyond: Sequence[str], console: Consol
 def _words(spread: Spread | None, unit: str) -> str:
     if spread is None:
         return "nothing to compare"
-    return f"differs by {spread.median:.3g} median, {spread.p95:.3g} p95, {spread.max:.3g} at most [{unit}]"
+    return f"differs by {spread.median:.3g} {unit} median, {spread.p95:.3g} {unit} p95, {spread.max:.3g} {unit} at most"

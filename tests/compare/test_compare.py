@@ -112,6 +112,7 @@ def test_the_command_compares_and_fails_where_it_is_told_to(logs: tuple[Path, Pa
     assert ran.code == EXIT_DIFFERENT
     assert "lateral_p95_m is 0.7" in ran.err
     assert "lateral_mean_m" in ran.out
+    assert "first: follow_line, completed: Every task was flown" in ran.out
     assert page.stat().st_size > 1_000_000
     fine = lineflight("compare", *logs, "--json", "--fail-if", "lateral_p95_m>5")
     assert fine.code == 0

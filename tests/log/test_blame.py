@@ -1,5 +1,6 @@
 """Blame by causing it: what was done to a flight is what its log says was done."""
 
+import asyncio
 import math
 import random
 from collections.abc import Callable
@@ -155,3 +156,18 @@ def test_a_motor_that_is_asked_for_more_than_the_others_is_named(tmp_path: Path)
     level = tuple(replace(one, motors=(0.5, 0.52, 0.55, 0.5, 0.51, 0.5)) for one in told)
     (found,) = find_excursions(replace(flight, imported=replace(own, actuators=level)))
     assert not any("motor" in words for words in found.evidence)
+
+
+def test_frames_that_do_not_come_are_missing_and_frames_without_a_line_are_too(tmp_path: Path) -> None:
+    def silence(cockpit: Cockpit) -> None:
+        cockpit.eyes.is_silent = True
+        asyncio.get_running_loop().call_later(2.0, lambda: setattr(cockpit.eyes, "is_silent", False))
+
+    def blind(cockpit: Cockpit) -> None:
+        cockpit.eyes.is_blind = True
+        asyncio.get_running_loop().call_later(2.0, lambda: setattr(cockpit.eyes, "is_blind", False))
+
+    for act, words in ((silence, "no frame came through vision for"), (blind, "frames showed a line")):
+        found = fly(tmp_path / f"{act.__name__}.mcap", 1, act)
+        assert (found[0].culprit, found[0].fault) == (Culprit.PERCEPTION, Fault.MISSING), found
+        assert any(words in line for line in found[0].evidence), found[0].evidence

@@ -6,13 +6,12 @@ gives is the reference which later replays are held against.
 
 import tempfile
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
-from mcap.records import Attachment, Channel, Header, Message, Metadata, Schema
-from mcap.writer import Writer
-
-from drivers.mcap_stream import IMAGE_TOPIC, open_records
+from drivers.mcap_stream import IMAGE_TOPIC
 from mission.log import channels
+from mission.log.copying import write_copy
 from mission.log.reader import Flight, read_flight
 from mission.log.records import VisionEntry
 from mission.plan_file import read_mission
@@ -48,40 +47,14 @@ def make(out: Path) -> None:
         mission.write_text(MISSION)
         outcome, _ = fly_virtually(read_mission(mission), SCENARIO, folder, lambda _: None, lambda _: None)
         thin = folder / "thin.mcap"
-        _thin(outcome.log, thin)
+        flown = read_flight(outcome.log)
+        write_copy(outcome.log, thin, [], lambda _: None, partial(_kept, flown))
         flight = read_flight(thin)
         out.unlink(missing_ok=True)
         write_reference(flight, replay(flight), out, lambda _: None)
 
 
-def _thin(log: Path, out: Path) -> None:
-    flight = read_flight(log)
-    with log.open("rb") as source, out.open("wb") as target:
-        writer = Writer(target)
-        topics: dict[int, str] = {}
-        schema_ids, channel_ids = {0: 0}, {}
-        for record in open_records(source):
-            if isinstance(record, Header):
-                writer.start(record.profile, record.library)
-            elif isinstance(record, Schema) and record.id not in schema_ids:
-                schema_ids[record.id] = writer.register_schema(record.name, record.encoding, record.data)
-            elif isinstance(record, Channel) and record.id not in topics:
-                topics[record.id] = record.topic
-                channel_ids[record.id] = writer.register_channel(
-                    record.topic, record.message_encoding, schema_ids[record.schema_id], record.metadata
-                )
-            elif isinstance(record, Attachment):
-                writer.add_attachment(record.create_time, record.log_time, record.name, record.media_type, record.data)
-            elif isinstance(record, Metadata):
-                writer.add_metadata(record.name, record.metadata)
-            elif isinstance(record, Message):
-                data = _kept(topics[record.channel_id], record.log_time, record.data, flight)
-                if data is not None:
-                    writer.add_message(channel_ids[record.channel_id], record.log_time, data, record.publish_time)
-        writer.finish()
-
-
-def _kept(topic: str, log_time_ns: int, data: bytes, flight: Flight) -> bytes | None:
+def _kept(flight: Flight, topic: str, log_time_ns: int, data: bytes) -> bytes | None:
     """What stays of a message; None: nothing."""
     if topic in _NOT_NEEDED:
         return None
