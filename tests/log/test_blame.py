@@ -11,7 +11,7 @@ import pytest
 import yaml
 
 from mission.log.blame.blame import find_excursions
-from mission.log.blame.records import Culprit, Excursion, Fault
+from mission.log.blame.records import Culprit, Excursion, Fault, Kind
 from mission.log.imported import Imported, ImportedActuators, ImportedLog
 from mission.log.reader import read_flight
 from mission.plan import MissionPlan
@@ -171,3 +171,20 @@ def test_frames_that_do_not_come_are_missing_and_frames_without_a_line_are_too(t
         found = fly(tmp_path / f"{act.__name__}.mcap", 1, act)
         assert (found[0].culprit, found[0].fault) == (Culprit.PERCEPTION, Fault.MISSING), found
         assert any(words in line for line in found[0].evidence), found[0].evidence
+
+
+def test_a_wind_that_is_too_strong_is_told_in_any_task(tmp_path: Path) -> None:
+    """A gust that the vehicle leans against as far as it may, in a task that follows nothing."""
+    gust = OneGust(3.0)
+    flight = fly_and_log(
+        tmp_path / "1.mcap",
+        PLAN,
+        wind=Wind(MEAN_WIND_M_S, 1, LINE_HEADING_RAD, fronts=gust),
+        in_task="ascend",
+        after_s=3.0,
+        do=lambda _: gust.begin(),
+    )
+    found = [excursion for excursion in find_excursions(flight) if excursion.kind is Kind.TILTED]
+    assert found
+    assert {(excursion.culprit, excursion.fault) for excursion in found} == {(Culprit.WIND, Fault.PUSHED)}
+    assert found[0].task == "ascend"

@@ -10,6 +10,7 @@ from mission.log.blame.leg import leg_of
 from mission.log.blame.line import misdated, off_line, unseen
 from mission.log.blame.records import Excursion, Limits
 from mission.log.blame.signals import knowledge_of, motion_of
+from mission.log.blame.tilt import tilted
 from mission.log.reader import Flight
 from mission.log.summary import FOLLOW_TASK, task_spans
 
@@ -17,12 +18,13 @@ DEFAULT_LIMITS = Limits()
 
 
 def find_excursions(flight: Flight, limits: Limits = DEFAULT_LIMITS) -> tuple[Excursion, ...]:
-    """All excursions of a flight while it followed its line, in the order of their times."""
+    """All excursions of a flight, in the order of their times; all but those in tilt while it followed its line."""
     if not flight.states:
         return ()
     whole, known = motion_of(flight), knowledge_of(flight)
-    found: list[Excursion] = []
-    for span in task_spans(flight):
+    tasks = task_spans(flight)
+    found: list[Excursion] = list(tilted(whole, tasks, limits))
+    for span in tasks:
         if span.task != FOLLOW_TASK:
             continue
         leg = leg_of(flight, whole, known, span)

@@ -16,6 +16,8 @@ class Kind(enum.StrEnum):
     """The frames bear other times than those at which they were taken."""
     OFF_HEIGHT = "off_height"
     """The vehicle was above or below its setpoint."""
+    TILTED = "tilted"
+    """The vehicle leaned as far as it may for a while, in whatever task: it could do no more."""
     OFF_HEADING = "off_heading"
     """The vehicle's nose pointed elsewhere than its setpoint's, while that stood still."""
 
@@ -55,6 +57,8 @@ class Limits:
     misdated_s: float = 0.1
     off_height_m: float = 1.0
     off_heading_rad: float = math.radians(6.0)
+    tilted_rad: float = math.radians(38.0)
+    tilted_s: float = 1.0
     least_s: float = 0.3
 
 

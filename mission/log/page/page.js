@@ -77,7 +77,7 @@
 
   const KINDS = {
     off_line: "Off the line", unseen: "The line unseen", misdated: "Frames with wrong times", off_height: "Off its height",
-    off_heading: "Off its heading",
+    off_heading: "Off its heading", tilted: "Leaning as far as it may",
   };
 
   function blame() {
