@@ -1,7 +1,6 @@
 """A flight's photographs with their poses, as programs for 3D reconstruction take them."""
 
 import csv
-import json
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -19,8 +18,6 @@ from mission.export.output import new_folder
 from mission.export.poses import ENU_FROM_NED, FRD_FROM_CAMERA, Floats, Poses, Track, inverse, product
 from mission.geodesy import points_at
 from mission.log.reader import Flight, read_flight
-
-_ATTACHMENT, _METADATA = "camera.json", "camera_intrinsics"
 
 _POSE_COLUMNS = (
     "name", "unix_ns", "north_m", "east_m", "down_m",
@@ -62,15 +59,10 @@ class ImageSet:
 
 def camera_of(flight: Flight) -> Intrinsics:
     """The intrinsics of the camera that the flight was flown with. Raises ExportError where the log lacks them."""
-    attached = flight.attachments.get(_ATTACHMENT)
-    told = flight.mission.metadata.get(_METADATA) if attached is None else attached
-    if told is None:
+    camera = flight.camera
+    if camera is None:
         raise ExportError(f"{flight.path} does not tell the camera's intrinsics; its images are of no use to COLMAP.")
-    try:
-        entry = json.loads(told)
-        return Intrinsics(**entry | {"distortion": tuple(entry["distortion"])})
-    except (KeyError, TypeError, ValueError) as error:
-        raise ExportError(f"The camera's intrinsics in {flight.path} cannot be read ({error}).") from error
+    return camera
 
 
 def export_images(

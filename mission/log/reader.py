@@ -88,12 +88,15 @@ class Flight:
 
     @property
     def camera(self) -> Intrinsics | None:
-        """The camera that the log's frames are from; None where the log does not tell."""
+        """The camera that the log's frames are from; None where the log does not tell. Raises LogError."""
         text = self.attachments.get("camera.json") or self.mission.metadata.get("camera_intrinsics")
         if text is None:
             return None
-        fields = json.loads(text)
-        return Intrinsics(**fields | {"distortion": tuple(fields["distortion"])})
+        try:
+            fields = json.loads(text)
+            return Intrinsics(**fields | {"distortion": tuple(fields["distortion"])})
+        except (KeyError, TypeError, ValueError) as error:
+            raise LogError(f"The camera's intrinsics in {self.path} cannot be read ({error}).") from error
 
 
 def read_flight(path: Path, *, with_images: bool = False) -> Flight:

@@ -1,6 +1,5 @@
 """A flight's log made into a video: its poses rendered again, with what was found and done on the way."""
 
-import json
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -105,7 +104,7 @@ def write_video(
     `size_px` is the size of each camera's picture, None as the flight's. `on_frame` hears which frame of how many is
     done. Raises PicturesError.
     """
-    intrinsics = _flight_camera(flight)
+    intrinsics = flight.camera or picture_camera(640, 480, _HFOV_DEG)
     if size_px is not None:
         intrinsics = scaled(intrinsics, *size_px)
     names: tuple[CameraName, ...] = ("down", "front") if camera == "both" else (camera,)
@@ -130,14 +129,6 @@ def write_video(
     finally:
         video.release()
     return n_frames
-
-
-def _flight_camera(flight: Flight) -> Intrinsics:
-    told = flight.mission.metadata.get("camera_intrinsics")
-    if told is None:
-        return picture_camera(640, 480, _HFOV_DEG)
-    entry = json.loads(told)
-    return Intrinsics(**entry | {"distortion": tuple(entry["distortion"])})
 
 
 class _View:
@@ -174,7 +165,7 @@ class _Overlay:
         self._reports = flight.reports
         self._report_times = np.array([report.t_capture_ns for report in flight.reports], dtype=np.int64)
         self._spans = task_spans(flight)
-        self._camera = _flight_camera(flight)
+        self._camera = flight.camera or picture_camera(640, 480, _HFOV_DEG)
         self._canvas = Canvas(width_px, height_px + _BAR_PX)
         side = round(_INSET_SHARE * height_px)
         self._box = Box(width_px - side - _MARGIN_PX, _MARGIN_PX, side, side)

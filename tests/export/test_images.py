@@ -24,6 +24,7 @@ from mission.export.errors import ExportError
 from mission.export.exif import Shot, focal_35mm, with_exif
 from mission.export.images import ImageSet, camera_of, export_images
 from mission.export.poses import Floats
+from mission.log.errors import LogError
 from mission.log.reader import Flight, read_images
 from mission.records import Attachment
 from tests.export.exported_flight import write_flight
@@ -251,7 +252,7 @@ def test_older_logs_tell_the_camera_in_their_metadata(flight: Flight) -> None:
     assert camera_of(flight) == CAMERA
     with pytest.raises(ExportError, match="does not tell"):
         camera_of(replace(flight, attachments={}))
-    with pytest.raises(ExportError, match="cannot be read"):
+    with pytest.raises(LogError, match="cannot be read"):
         camera_of(replace(flight, attachments={"camera.json": b'{"width_px": 1}'}))
 
 
