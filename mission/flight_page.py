@@ -2,15 +2,11 @@
 
 import contextlib
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from mission.log.errors import LogError
-from mission.log.page.page import flight_page
+from mission.log.page.page import Ground, flight_page
 from mission.log.reader import Flight, read_flight
 from mission.log.summary import FlightReport
-
-if TYPE_CHECKING:
-    from mission.log.page.page import Ground
 
 
 class PageError(Exception):
@@ -42,7 +38,7 @@ def write_text(file: Path, text: str) -> None:
         raise PageError(words) from error
 
 
-def ground_of(flight: Flight) -> "Ground | None":
+def ground_of(flight: Flight) -> Ground | None:
     """The simulated world's ground under a flight; None where it was flown elsewhere, or that world is not here."""
     world_name = flight.mission.metadata.get("world")
     if world_name is None:

@@ -35,7 +35,8 @@ def page_frames(flight: Flight, start_ns: int) -> list[dict[str, Any]]:
     Raises LogError when the log cannot be read any more.
     """
     reports = {report.t_capture_ns: report for report in flight.reports if report.t_capture_ns in flight.image_times_ns}
-    wanted = {list(reports)[k] for k in evenly(len(reports), MOST_FRAMES).tolist()}
+    times_ns = list(reports)
+    wanted = {times_ns[k] for k in evenly(len(times_ns), MOST_FRAMES).tolist()}
     jpegs = sorted((t_ns, jpeg) for t_ns, jpeg in read_images(flight) if t_ns in wanted) if wanted else []
     size, n_frames = _choose([jpeg for _, jpeg in jpegs])
     frames = []
