@@ -6,7 +6,7 @@ MISSION ?= missions/follow_line.yaml
 FLY ?= --speed 1.5
 PYTEST ?=
 
-.PHONY: fly test test-v4l2 test-page golden check bench bench-inspection bench-vision bench-jitter bench-soak bench-following bench-rendered world-pictures schema diagram safety-table streams-table clean clean-v4l2
+.PHONY: fly test test-v4l2 test-page fuzz golden check bench bench-inspection bench-vision bench-jitter bench-soak bench-following bench-rendered world-pictures schema diagram safety-table streams-table clean clean-v4l2
 
 fly: $(VENV)/.installed
 	$(BIN)/lineflight dry-run $(MISSION) $(FLY)
@@ -21,6 +21,9 @@ test-v4l2: $(VENV)/.installed-dev
 
 test-page: $(VENV)/.installed-dev
 	$(BIN)/python -m tests.page_browser $(PYTEST)
+
+fuzz: $(VENV)/.installed-dev
+	LINEFLIGHT_EXAMPLES=fuzz $(BIN)/python -m pytest -n auto -m "hypothesis and not real_time" $(PYTEST)
 
 golden: $(VENV)/.installed-dev
 	$(BIN)/python -m tests.replay.golden

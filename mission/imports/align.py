@@ -18,6 +18,8 @@ MIN_MOVING_S = 5.0
 """The vehicle has to have moved for this long within the overlap."""
 MIN_CORRELATION = 0.99
 """One flight's two logs reach 0.9998; others 0.986 in 34 recordings of PX4, each with each, and 0.989 in simulation."""
+MIN_COARSE_CORRELATION = 0.9
+"""Below this, before the offset is refined, there is nothing to refine: the positions of two flights lead anywhere."""
 MAX_POSITION_RMS_M, MAX_POSITION_RMS_S = 0.15, 0.05
 """So far may positions differ, and by so much of a second's flight more: one flight's do by 0.01 m, others by 0.3 m."""
 MAX_LAG_S = 1.0
@@ -91,6 +93,7 @@ def check_motion(ours: Motion, theirs: Motion, clock: ClockMap) -> tuple[float, 
         )
     lags_s = np.arange(-MAX_LAG_S, MAX_LAG_S + GRID_S / 2, GRID_S)
     correlations = [_fit(ours, theirs, clock.later(lag_s), None).correlation for lag_s in lags_s.tolist()]
+    _require_correlation(max(correlations), MIN_COARSE_CORRELATION)
     lagged = clock.later(float(lags_s[int(np.argmax(correlations))]))
     refined, shift_m = _refine(ours, theirs, lagged, with_drift=False)
     fit = _fit(ours, theirs, refined, shift_m)
@@ -105,12 +108,16 @@ def _pair(ours: Motion, theirs: Motion, clock: ClockMap) -> Pair:
     return Pair.of(ours, replace(theirs, t_s=clock.ours_s(theirs.t_s)))
 
 
-def _require_one_flight(fit: Fit) -> None:
-    if not fit.correlation >= MIN_CORRELATION:
+def _require_correlation(correlation: float, least: float) -> None:
+    if not correlation >= least:
         raise NoMatchError(
-            f"their motion agrees only to {max(fit.correlation, 0.0):.3f} where {MIN_CORRELATION} is needed; they are "
-            "of different flights"
+            f"their motion agrees only to {max(correlation, 0.0):.3f} where {MIN_CORRELATION} is needed; they are of "
+            "different flights"
         )
+
+
+def _require_one_flight(fit: Fit) -> None:
+    _require_correlation(fit.correlation, MIN_CORRELATION)
     limit_m = MAX_POSITION_RMS_M + MAX_POSITION_RMS_S * fit.speed_rms_m_s
     if not fit.position_rms_m <= limit_m:
         raise NoMatchError(
@@ -158,6 +165,7 @@ def _coarse(ours: Motion, theirs: Motion) -> ClockMap:
     product = correlate(spectrum(a.signal), spectrum(b.signal))
     score[counts] = product[counts] / np.sqrt(power_a[counts] * power_b[counts])
     best = int(np.argmax(score))
+    _require_correlation(float(score[best]), MIN_COARSE_CORRELATION)
     _refuse_rivals(score, best)
     before, at, after = score[best - 1], score[best], score[(best + 1) % size]
     bend = before - 2 * at + after

@@ -42,7 +42,7 @@ def in_clock(motion: Motion, clock: ClockMap) -> Motion:
     return Motion(theirs_s, motion.position_m, motion.velocity_m_s, motion.yaw_rad)
 
 
-@settings(max_examples=40, deadline=None)
+@settings(max_examples=40)
 @given(
     seed=st.integers(0, 10_000),
     offset_s=st.floats(-3_000.0, 3_000.0),
@@ -68,7 +68,7 @@ def test_offset_and_drift_come_back(
     assert fit.velocity_rms_m_s < 3 * NOISE_M_S
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(seed=st.integers(0, 10_000), lag_s=st.floats(0.0, 0.4), drift=st.floats(-100e-6, 100e-6))
 def test_a_known_clock_tells_how_late_our_motion_is(seed: int, lag_s: float, drift: float) -> None:
     true = wander(seed, np.arange(5_000.0, 5_120.0, 0.05))
@@ -79,7 +79,7 @@ def test_a_known_clock_tells_how_late_our_motion_is(seed: int, lag_s: float, dri
     assert fit.correlation > 0.99
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=25)
 @given(seed=st.integers(0, 10_000), length_s=st.floats(40.0, 300.0))
 def test_another_flight_is_refused(seed: int, length_s: float) -> None:
     ours = wander(seed, np.arange(0.0, length_s, 0.05))

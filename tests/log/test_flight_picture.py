@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from mission.log.canvas import ACCENT, Box, Canvas, rounded_mask
@@ -124,7 +124,6 @@ def test_a_log_of_nothing_but_its_start_is_drawn(tmp_path: Path) -> None:
     assert draw_summary(flight, summarise(flight), None).std() > 0
 
 
-@settings(deadline=None)
 @given(st.floats(0.01, 1e5))
 def test_round_numbers_are_near_and_on_the_right_side(about: float) -> None:
     assert about / 2.5 * (1 - 1e-6) <= nice_length_m(about) <= about * (1 + 1e-6)
@@ -142,7 +141,6 @@ def test_text_is_aligned_and_as_wide_as_it_says() -> None:
     assert width_px - 6 <= columns.max() - 20 <= width_px + 2
 
 
-@settings(deadline=None)
 @given(st.integers(1, 60), st.integers(1, 60), st.integers(0, 12))
 def test_rounded_corners_cover_the_middle_and_no_more_than_the_box(width: int, height: int, radius: int) -> None:
     mask = rounded_mask(width, height, radius)

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from rich.console import Console
@@ -49,7 +49,6 @@ def rotation(yaw_rad: float, pitch_rad: float) -> np.ndarray:
     return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ np.array([[cp, 0, sp], [0, 1, 0], [-sp, 0, cp]])
 
 
-@settings(deadline=None)
 @given(
     arrays(np.float64, (12,), elements=st.floats(0.0, 50.0), unique=True),
     st.floats(0.01, 0.5),
@@ -80,7 +79,6 @@ def test_right_of_the_axis_is_positive_and_beyond_its_end_the_end_counts() -> No
     np.testing.assert_allclose(direction_rad, [0.0, 0.0, math.pi / 2, 0.0, math.pi / 2])
 
 
-@settings(deadline=None)
 @given(coordinates_m, coordinates_m, st.floats(-math.pi, math.pi), st.floats(-20, 20), st.floats(-5, 5))
 def test_distance_from_an_axis_does_not_depend_on_where_it_lies(north, east, turn_rad, along, aside) -> None:
     turned = np.array([[math.cos(turn_rad), -math.sin(turn_rad)], [math.sin(turn_rad), math.cos(turn_rad)]])

@@ -162,7 +162,6 @@ def test_units_stand_in_the_schema() -> None:
 st.register_type_strategy(float, st.floats(allow_nan=False, allow_infinity=False))
 
 
-@settings(deadline=None)
 @given(
     st.builds(VehicleState)
     | st.builds(TaskEnded)
@@ -187,7 +186,7 @@ def test_any_record_survives_json(record: object) -> None:
     assert channels.decode(topic, channels.encode(record)) == record
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=30)
 @given(st.integers(10, 200), st.floats(0.0, 0.2), st.integers(0, 10_000))
 def test_a_rate_limit_keeps_the_rate_whatever_comes(source_hz: int, jitter: float, seed: int) -> None:
     draw = random.Random(seed)  # hypothesis' own would swing from one extreme to the other: that is no jitter

@@ -92,9 +92,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def many(n_examples: int) -> settings:
-    return settings(
-        max_examples=n_examples, derandomize=True, database=None, deadline=None, suppress_health_check=list(HealthCheck)
-    )
+    return settings(max_examples=n_examples, derandomize=True, database=None, suppress_health_check=list(HealthCheck))
 
 
 def places(data: Any) -> list[tuple[Any, Any]]:

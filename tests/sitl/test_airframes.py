@@ -117,7 +117,7 @@ def test_the_autopilot_flies_with_what_the_battery_leaves() -> None:
 
 
 @EVERY
-@settings(max_examples=60, deadline=None)
+@settings(max_examples=60)
 @given(
     thrust=st.floats(-2.0, 3.0),
     torque=st.tuples(*[st.floats(-5.0, 5.0)] * 3),

@@ -70,7 +70,6 @@ def test_chords_run_through_the_centre_without_holes() -> None:
     assert np.max(np.abs(np.diff(circle.chords, axis=1))) == 1
 
 
-@settings(deadline=None)
 @given(x=st.floats(70, 90), y=st.floats(70, 90), angle_rad=st.floats(-math.pi, math.pi), length_px=st.floats(30, 60))
 def test_an_edge_is_found_once_with_its_angle_its_ends_and_its_direction(
     x: float, y: float, angle_rad: float, length_px: float
@@ -84,7 +83,6 @@ def test_an_edge_is_found_once_with_its_angle_its_ends_and_its_direction(
     assert line_angle_distance_rad(segment_angles_rad(segments), wanted)[0] < math.atan(1.0 / length_px)
 
 
-@settings(deadline=None)
 @given(edge_chains, edge_chains, st.integers(-9, 9), st.integers(-9, 9))
 def test_a_shifted_image_gives_shifted_segments(
     first: NDArray[np.uint8], second: NDArray[np.uint8], shift_x: int, shift_y: int
@@ -96,7 +94,6 @@ def test_a_shifted_image_gives_shifted_segments(
     )
 
 
-@settings(deadline=None)
 @given(edge_chains)
 def test_a_quarter_turn_turns_the_segment(codes: NDArray[np.uint8]) -> None:
     turned = np.rot90(codes)  # anticlockwise: x, y -> y, size - 1 - x
@@ -143,7 +140,7 @@ def test_the_search_stops_when_its_list_is_full(monkeypatch: pytest.MonkeyPatch)
     assert len(search(codes)) == 3
 
 
-@settings(deadline=None, max_examples=10)
+@settings(max_examples=10)
 @given(st.integers(0, 1000))
 def test_the_search_compiled_equals_plain_python(seed: int) -> None:
     image = expose(ground(seed, 20.0, 90, 70), seed)

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from tests.vision.nadir_frames import draw_line, expose, ground
@@ -33,7 +33,6 @@ def test_the_thresholds_rise_with_the_texture() -> None:
     assert shares[1] < 1.5 * shares[0]
 
 
-@settings(deadline=None)
 @given(st.floats(-math.pi, math.pi))
 def test_a_code_is_the_direction_towards_the_brighter_side(direction_rad: float) -> None:
     y, x = np.mgrid[:64, :64] - 31.5

@@ -49,7 +49,7 @@ def is_honest(detection: Detection) -> bool:
     )
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(
     seed=st.integers(0, 10_000),
     angle_deg=st.floats(-90, 90),
@@ -154,7 +154,7 @@ def test_a_plain_image_holds_nothing(finder: LineFinder, level: int) -> None:
     assert detection.n_lines == 0
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(
     st.one_of(
         arrays(np.uint8, st.tuples(st.integers(1, 40), st.integers(1, 40))),
@@ -183,7 +183,7 @@ def test_what_is_no_image_is_refused(finder: LineFinder) -> None:
         finder.find(np.zeros((10, 10)))  # type: ignore[arg-type]
 
 
-@settings(deadline=None, max_examples=15)
+@settings(max_examples=15)
 @given(seed=st.integers(0, 999), angle_deg=st.floats(-85, 85), offset_px=st.floats(-90, 90))
 def test_a_turned_frame_has_a_turned_answer(finder: LineFinder, seed: int, angle_deg: float, offset_px: float) -> None:
     frame = nadir_frame(seed, math.radians(angle_deg), offset_px)
@@ -198,7 +198,7 @@ def test_a_turned_frame_has_a_turned_answer(finder: LineFinder, seed: int, angle
     assert after.offset_px == pytest.approx(sign * before.offset_px, abs=1.0)
 
 
-@settings(deadline=None, max_examples=15)
+@settings(max_examples=15)
 @given(shift_x=st.integers(0, 60), shift_y=st.integers(0, 60), angle_deg=st.floats(-80, 80))
 def test_a_shifted_frame_has_a_shifted_answer(finder: LineFinder, shift_x: int, shift_y: int, angle_deg: float) -> None:
     frame = nadir_frame(7, math.radians(angle_deg), 0.0, spacing_px=50.0)
@@ -210,7 +210,7 @@ def test_a_shifted_frame_has_a_shifted_answer(finder: LineFinder, shift_x: int, 
     assert after.offset_px - before.offset_px == pytest.approx(moved_px, abs=1.0)
 
 
-@settings(deadline=None, max_examples=15)
+@settings(max_examples=15)
 @given(seed=st.integers(0, 999), angle_deg=st.floats(-85, 85), offset_px=st.floats(-90, 90))
 def test_a_mirrored_frame_has_a_mirrored_answer(
     finder: LineFinder, seed: int, angle_deg: float, offset_px: float
@@ -224,7 +224,7 @@ def test_a_mirrored_frame_has_a_mirrored_answer(
     assert after.offset_px == pytest.approx(-before.offset_px, abs=1.0)
 
 
-@settings(deadline=None, max_examples=15)
+@settings(max_examples=15)
 @given(seed=st.integers(0, 999), angle_deg=st.floats(-85, 85), gain=st.floats(0.6, 1.5), lift=st.floats(-20, 40))
 def test_a_brighter_or_darker_frame_has_the_same_answer(
     finder: LineFinder, seed: int, angle_deg: float, gain: float, lift: float
@@ -238,7 +238,7 @@ def test_a_brighter_or_darker_frame_has_the_same_answer(
     assert after.offset_px == pytest.approx(before.offset_px, abs=1.0)
 
 
-@settings(deadline=None, max_examples=15)
+@settings(max_examples=15)
 @given(seed=st.integers(0, 999), angle_deg=st.floats(-85, 85), sigma=st.floats(0.5, 8.0))
 def test_a_noisier_frame_has_the_same_answer(finder: LineFinder, seed: int, angle_deg: float, sigma: float) -> None:
     frame = nadir_frame(seed, math.radians(angle_deg), 20.0)

@@ -60,7 +60,6 @@ pieces = st.lists(
 ).map(lambda rows: np.array([(x, y, x + r * math.cos(a), y + r * math.sin(a)) for x, y, a, r in rows]).reshape(-1, 4))
 
 
-@settings(deadline=None)
 @given(pieces)
 def test_swapped_ends_give_swapped_lines(segments: NDArray[np.float64]) -> None:
     swap = [2, 3, 0, 1]
@@ -70,7 +69,6 @@ def test_swapped_ends_give_swapped_lines(segments: NDArray[np.float64]) -> None:
     np.testing.assert_allclose(swapped_covered_px, covered_px, atol=1e-6)
 
 
-@settings(deadline=None)
 @given(pieces)
 def test_linking_invents_and_loses_nothing(segments: NDArray[np.float64]) -> None:
     lines, covered_px = link_segments(segments, TURN_RAD, 2.5, 100.0)
@@ -80,7 +78,7 @@ def test_linking_invents_and_loses_nothing(segments: NDArray[np.float64]) -> Non
     assert np.all(np.diff(segment_lengths_px(lines)) <= 1e-9)
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(pieces)
 def test_linking_compiled_equals_plain_python(segments: NDArray[np.float64]) -> None:
     order = np.argsort(-segment_lengths_px(segments), kind="stable")

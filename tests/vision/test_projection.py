@@ -24,7 +24,7 @@ def projected(field: np.ndarray) -> np.ndarray:
     return buffers[project(field, *buffers)]
 
 
-@settings(deadline=None, max_examples=60)
+@settings(max_examples=60)
 @given(
     arrays(np.int16, st.tuples(st.integers(1, 40), st.integers(1, 30)), elements=st.integers(-63, 63)),
     st.data(),
@@ -36,7 +36,7 @@ def test_every_pixel_counts_once_for_each_lean(field: np.ndarray, data: st.DataO
     assert int(sums[lean, height - lean :].astype(int).sum()) == int(field.astype(int).sum())
 
 
-@settings(deadline=None, max_examples=80)
+@settings(max_examples=80)
 @given(st.integers(2, 320), st.data())
 def test_a_sum_runs_along_its_line(height: int, data: st.DataObject) -> None:
     # Where a row's pixels hold their own column, a sum tells in which column it crossed that row.
@@ -74,7 +74,7 @@ def test_small_images_have_no_lines_or_honest_ones(shape: tuple[int, int]) -> No
     assert found.segments.shape == (0, 4)
 
 
-@settings(deadline=None, max_examples=25)
+@settings(max_examples=25)
 @given(angle_deg=st.floats(-90, 90), offset_px=st.floats(-150, 150), level=st.sampled_from([30.0, 210.0]))
 def test_both_edges_of_a_drawn_line_are_found(angle_deg: float, offset_px: float, level: float) -> None:
     angle_rad = math.radians(angle_deg)

@@ -29,7 +29,7 @@ def aside_px(angle_rad: float) -> NDArray[np.float64]:
     return aside
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(angle_rad=st.floats(-math.pi / 2, math.pi / 2), width_px=st.floats(1.2, 5.0), is_bright=st.booleans())
 def test_a_thin_line_keeps_both_of_its_edges(angle_rad: float, width_px: float, is_bright: bool) -> None:
     levels = draw_line(ground(5, 4.0, 240, 240), angle_rad, 0.0, width_px, 200.0 if is_bright else 20.0)
@@ -43,7 +43,7 @@ def test_a_thin_line_keeps_both_of_its_edges(angle_rad: float, width_px: float, 
         assert share_facing(codes, direction_rad, is_beside) > 0.65
 
 
-@settings(deadline=None, max_examples=20)
+@settings(max_examples=20)
 @given(angle_rad=st.floats(-math.pi / 2, math.pi / 2))
 def test_a_step_loses_its_edge_and_keeps_it_when_no_ridge_is_asked_for(angle_rad: float) -> None:
     aside = aside_px(angle_rad)

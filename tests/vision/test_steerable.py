@@ -92,7 +92,7 @@ def test_the_energy_of_a_wave_does_not_know_its_phase(period_px: float) -> None:
     assert (even[24, 16:80] ** 2).std() > 0.3 * energy.mean()  # G2 alone does
 
 
-@settings(deadline=None, max_examples=30)
+@settings(max_examples=30)
 @given(angle_rad=st.floats(-math.pi, math.pi), sigma_px=st.floats(0.8, 3.0))
 def test_steering_is_filtering_with_the_turned_filter(angle_rad: float, sigma_px: float) -> None:
     image = np.random.default_rng(1).integers(0, 256, (40, 40), dtype=np.uint8)
@@ -120,7 +120,7 @@ def test_a_ramp_answers_its_slope() -> None:
     np.testing.assert_array_equal(ridge, 0)
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(angle_rad=st.floats(-math.pi / 2, math.pi / 2), width_px=st.floats(1.5, 4.0))
 def test_a_bar_is_a_ridge_with_two_opposite_steps(angle_rad: float, width_px: float) -> None:
     across = np.array([math.cos(angle_rad), math.sin(angle_rad)])
@@ -134,7 +134,7 @@ def test_a_bar_is_a_ridge_with_two_opposite_steps(angle_rad: float, width_px: fl
             assert sign * side * towards_bright < -0.35 * abs(ridge[40, 40])
 
 
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @given(angle_rad=st.floats(-math.pi / 2, math.pi / 2))
 def test_a_step_has_its_greatest_h2_where_g2_is_zero(angle_rad: float) -> None:
     y, x = np.mgrid[:81, :81] - 40.0

@@ -5,7 +5,7 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
@@ -33,7 +33,6 @@ def line_coverage(
     return coverage
 
 
-@settings(deadline=None)  # the first example compiles
 @given(
     angle_rad=st.floats(-math.pi, math.pi),
     offset_px=st.floats(-10.0, 10.0),
@@ -51,7 +50,6 @@ def test_a_strip_shows_its_true_coverage_without_ripple(
     assert coverage.max() <= 1.0 + 1e-5
 
 
-@settings(deadline=None)
 @given(distance=st.floats(-1.0, 1.0), angle_rad=st.floats(0.0, 2 * math.pi))
 def test_a_square_is_cut_into_two_parts(distance: float, angle_rad: float) -> None:
     cosine, sine = math.cos(angle_rad), math.sin(angle_rad)
@@ -62,7 +60,6 @@ def test_a_square_is_cut_into_two_parts(distance: float, angle_rad: float) -> No
 
 
 @pytest.mark.parametrize("shading", [FLAT, CYLINDER])
-@settings(deadline=None)
 @given(strip=st.lists(st.floats(-5.0, 25.0), min_size=6, max_size=6))
 def test_the_compiled_strip_equals_plain_python(shading: NDArray[np.float64], strip: list[float]) -> None:
     sizes = np.array(strip)

@@ -4,7 +4,7 @@ from typing import Any, get_args
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 from sitl.render.fields import divide, paint_fields
@@ -135,7 +135,6 @@ def test_a_large_ground_gets_coarser_texels() -> None:
 
 
 @given(start=coordinates, end=coordinates)
-@settings(deadline=None)
 def test_what_is_clipped_is_in_view(start: list[float], end: list[float]) -> None:
     p, q = np.array(start), np.array(end)
     first, last = clip_to_view(p, q, VIEW)

@@ -142,7 +142,7 @@ def test_the_image_hangs_together_with_the_vehicle() -> None:
 @given(
     north_m=st.floats(-30, 30), yaw_rad=st.floats(-3, 3), pitch_rad=st.floats(-0.4, 0.4), roll_rad=st.floats(-0.4, 0.4)
 )
-@settings(deadline=None, max_examples=40)
+@settings(max_examples=40)
 @pytest.mark.parametrize("camera", [BENT, FISHEYE], ids=["bent", "fisheye"])
 def test_rays_and_projection_are_inverse(
     camera: Intrinsics, north_m: float, yaw_rad: float, pitch_rad: float, roll_rad: float

@@ -35,7 +35,7 @@ def mutate(node: object, data: st.DataObject) -> object:
     return node
 
 
-@settings(deadline=None, max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=300, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_a_mangled_file_is_a_world_or_a_sentence(tmp_path: Path, data: st.DataObject) -> None:
     mangled = copy.deepcopy(data.draw(st.sampled_from(FILES)))

@@ -186,7 +186,7 @@ tags = st.fixed_dictionaries(
 )
 
 
-@settings(deadline=None, max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=60, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(ways=st.lists(st.tuples(st.lists(points, min_size=2, max_size=7), tags), min_size=1, max_size=4))
 def test_whatever_the_map_says_the_world_loads_or_a_sentence_tells_why(
     tmp_path: Path, ways: list[tuple[list[tuple[float, float]], dict[str, str]]]

@@ -32,7 +32,7 @@ FAR = "trees: [{kind: bush, place_ne_m: [5000, 5000], height_m: 1}]\n"
 BOUNDS = (-150.0, -220.0, 180.0, 220.0)
 
 
-@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     density=st.floats(1.0, 400.0),
     keep_m=st.floats(0.0, 60.0),
