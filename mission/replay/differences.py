@@ -53,9 +53,14 @@ class SetpointDifferences:
 
 @dataclass(frozen=True, slots=True)
 class Differences:
-    """A replay held against the flight itself, or against the reference that its log holds (`is_reference`)."""
+    """A replay held against the flight itself, or against the reference that its log holds (`is_reference`).
+
+    `is_by_order` says that each tick saw what it saw in flight; otherwise that was told by times, which may err by a
+    tick.
+    """
 
     is_reference: bool
+    is_by_order: bool
     estimates: EstimateDifferences
     setpoints: SetpointDifferences
 

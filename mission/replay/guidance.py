@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 from drivers.camera.camera import Intrinsics
 from drivers.clock import NS_PER_S
-from mission.autopilot import Setpoint, VehicleState
+from mission.autopilot import Setpoint
 from mission.build import build_task, guidance_settings, setpoint_limits
 from mission.eyes import Lookout, Notice
 from mission.guidance import GuidanceSettings, leash
@@ -14,6 +14,7 @@ from mission.log.reader import Flight
 from mission.log.records import SentSetpoint
 from mission.plan import MissionPlan
 from mission.records import Event, LineFix
+from mission.replay.pairing import Moment
 from mission.safety import PAUSES
 from mission.tasks.task import FlightMemory, Observation, Task
 from vision.records import VisionReport
@@ -34,24 +35,16 @@ class ReplayedTick:
 
 @dataclass(slots=True)
 class _ReplayedEyes:
-    """mission.eyes.Eyes on reports that are there already: each is handed over once its latency has passed."""
+    """mission.eyes.Eyes on reports that are there already: those of the tick."""
 
-    reports: Sequence[VisionReport]
-    now_ns: int = 0
+    reports: Sequence[VisionReport] = ()
     failure: str | None = None
     missing: str | None = None
     impairment: Notice | None = None
-    _next: int = 0
 
     def take(self) -> list[VisionReport]:
-        """The reports that are due."""
-        first = self._next
-        while self._next < len(self.reports):
-            report = self.reports[self._next]
-            if report.t_capture_ns + report.latency_ns > self.now_ns:
-                break
-            self._next += 1
-        return list(self.reports[first : self._next])
+        """The reports that the tick took."""
+        return list(self.reports)
 
     def take_notices(self) -> list[Notice]:
         """Nothing happens to these eyes."""
@@ -77,29 +70,29 @@ class _Fixes:
 
 
 def replay_guidance(
-    flight: Flight, plan: MissionPlan, camera: Intrinsics, reports: Sequence[VisionReport]
+    flight: Flight, plan: MissionPlan, camera: Intrinsics, moments: Sequence[Moment]
 ) -> Iterator[ReplayedTick]:
     """What today's task would have sent at each tick that sent a setpoint.
 
-    It starts from the flight's setpoint before the tick and its state then, and sees `reports`, in the order in which
-    they were told. Since each tick starts from where the flight was, a difference does not grow from tick to tick.
-    Tasks that the flight did not reach are not flown, searches and pauses are passed over. `plan` is what was flown.
+    It starts from the flight's setpoint before the tick, and sees what the flight's `moments` hold. Since each tick
+    starts from where the flight was, a difference does not grow from tick to tick. Tasks that the flight did not reach
+    are not flown, searches and pauses are passed over. `plan` is what was flown.
     """
-    if not flight.states or not flight.ticks:
+    if not flight.states:
         return
     guidance, leash_m = guidance_settings(plan.guidance), setpoint_limits(plan).leash_m
     memory = _memory(flight, guidance)
     start = memory.start
-    eyes = _ReplayedEyes(reports)
+    eyes = _ReplayedEyes()
     lookout = Lookout(eyes, _Fixes(), camera, guidance)
     timeline = _Timeline(flight)
     task: Task | None = None
     index: int | None = None
-    for tick in flight.ticks:
-        state = timeline.state_at(tick.t_ns)
+    for moment in moments:
+        tick, state = moment.tick, moment.state
         if state is None:
             continue
-        eyes.now_ns = tick.t_ns
+        eyes.reports = moment.reports
         flown_index = timeline.task_at(tick.t_ns)
         if flown_index != index:
             index = flown_index
@@ -123,7 +116,6 @@ class _Timeline:
     """What a flight's records say of a tick; asked for ticks in their order."""
 
     def __init__(self, flight: Flight) -> None:
-        self._states = flight.states
         self._setpoints = flight.setpoints
         # A task that ends at the time at which the next one starts comes first.
         ends: list[tuple[int, int | None]] = [(ended.t_ns, None) for ended in flight.tasks_ended]
@@ -131,19 +123,7 @@ class _Timeline:
         self._changes = sorted([*ends, *starts], key=lambda change: (change[0], change[1] is not None))
         self._pauses = _pauses(flight.events)
         self._ticks = [tick.t_ns for tick in flight.ticks] + [flight.end_ns + 1]
-        self._state = self._setpoint = self._tick = -1
-
-    def state_at(self, t_ns: int) -> VehicleState | None:
-        """The state that the tick saw: each tick logs one, so they are paired by their order where none is missing.
-
-        Otherwise the newest one that was there.
-        """
-        if len(self._states) == len(self._ticks) - 1:
-            self._state += 1
-            return self._states[self._state]
-        while self._state + 1 < len(self._states) and self._states[self._state + 1].t_ns <= t_ns:
-            self._state += 1
-        return self._states[self._state] if self._state >= 0 else None
+        self._setpoint = self._tick = -1
 
     def task_at(self, t_ns: int) -> int | None:
         """The task that ran when the tick began; one that started in a tick is flown from the next one on."""

@@ -1,7 +1,7 @@
 """Fly a log again: today's vision on its frames, today's guidance on its states, held against what it holds."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from mission.autopilot import Setpoint
@@ -12,6 +12,7 @@ from mission.log.reader import Flight
 from mission.plan import MissionPlan
 from mission.replay.differences import Differences, estimate_differences, setpoint_differences
 from mission.replay.guidance import ReplayedTick, replay_guidance
+from mission.replay.pairing import frame_of, moments_of
 from mission.replay.records import ReplayedEstimate, ReplayedSetpoint
 from mission.replay.vision import replay_vision
 from mission.yaml_document import DocumentError, parse_document
@@ -20,10 +21,11 @@ from vision.records import VisionReport
 
 @dataclass(frozen=True, slots=True)
 class Replay:
-    """What today's program made of a flight's frames and states."""
+    """What today's program made of a flight's frames and states; `is_by_order` as in mission.replay.pairing.Moments."""
 
     reports: tuple[VisionReport, ...]
     ticks: tuple[ReplayedTick, ...]
+    is_by_order: bool
 
 
 def replay(flight: Flight, on_frame: Callable[[], None] = lambda: None) -> Replay:
@@ -37,12 +39,13 @@ def replay(flight: Flight, on_frame: Callable[[], None] = lambda: None) -> Repla
     if not flight.image_times_ns:
         raise LogError(f"The log {flight.path} holds no frames (vision.log_rate_hz was 0): there is nothing to replay.")
     reports = tuple(replay_vision(flight, vision_settings(plan, camera), on_frame))
-    today = {report.t_capture_ns: report for report in reports}
-    told = sorted(
-        (today.get(report.t_capture_ns, report) for report in flight.reports),
-        key=lambda report: (report.t_capture_ns + report.latency_ns, report.t_capture_ns),
-    )
-    return Replay(reports, tuple(replay_guidance(flight, plan, camera, told)))
+    today = {frame_of(report): report for report in reports}
+    paired = moments_of(flight)
+    moments = [
+        replace(moment, reports=tuple(today.get(frame_of(report), report) for report in moment.reports))
+        for moment in paired.moments
+    ]
+    return Replay(reports, tuple(replay_guidance(flight, plan, camera, moments)), paired.is_by_order)
 
 
 def differences(flight: Flight, replayed: Replay) -> Differences:
@@ -59,7 +62,10 @@ def differences(flight: Flight, replayed: Replay) -> Differences:
         pairs = [(tick.replayed, tick.flown) for tick in replayed.ticks]
         then = {t_ns: then[t_ns] for t_ns in flight.image_times_ns if t_ns in then}
     return Differences(
-        bool(flight.reference_estimates), estimate_differences(now, then), setpoint_differences(pairs, n_lacking)
+        bool(flight.reference_estimates),
+        replayed.is_by_order,
+        estimate_differences(now, then),
+        setpoint_differences(pairs, n_lacking),
     )
 
 

@@ -8,6 +8,11 @@ from rich.text import Text
 
 from mission.replay.differences import Differences, Spread
 
+_BY_TIME = (
+    "The log was sorted by time since it was flown: which estimate a control tick used is told by latencies, which may "
+    "err by a tick. Replay the log as it was recorded."
+)
+
 
 def print_differences(found: Differences, beyond: Sequence[str], console: Console) -> None:
     """Print the differences, and first what of them is `beyond` the tolerance."""
@@ -16,6 +21,8 @@ def print_differences(found: Differences, beyond: Sequence[str], console: Consol
     console.print(Text(f"Replayed, and held against {against}", style="bold"))
     for line in beyond:
         console.print(Text("  " + line, style="bold red"))
+    if not found.is_by_order:
+        console.print(Text(f"  {_BY_TIME}", style="yellow"))
     estimates, setpoints = found.estimates, found.setpoints
     table = Table(box=None, show_header=False)
     table.add_column(no_wrap=True, style="dim")

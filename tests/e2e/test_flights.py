@@ -10,7 +10,9 @@ import pytest
 
 from drivers.camera.calibration_file import write_calibration
 from drivers.camera.camera import Intrinsics
+from mission.log.reader import read_flight
 from mission.simulated.simulation import free_udp_port
+from tests.replay.own_estimates import distance_m, replay_own_estimates
 from tests.support.command_line import ROOT, lineflight, lineflight_stopped
 
 pytestmark = pytest.mark.real_time
@@ -48,6 +50,10 @@ def test_dry_run_follows_the_line_and_comes_home(tmp_path: Path) -> None:
     assert report["preflight"]["warnings"] == report["preflight"]["failures"] == []
     assert Path(report["picture"]).stat().st_size > 100_000
     assert Path(report["page"]).stat().st_size > 5_000_000
+
+    ticks = replay_own_estimates(read_flight(Path(report["log"])))
+    assert len(ticks) > 1000
+    assert max(map(distance_m, ticks)) < 0.001  # whatever was late in flight: each tick sees what it saw
 
     inspected = lineflight("inspect", report["log"], "--json")
     assert inspected.code == 0

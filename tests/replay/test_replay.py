@@ -7,17 +7,23 @@ from pathlib import Path
 
 import pytest
 
+from mission.autopilot import VehicleState
 from mission.ending import EXIT_BAD_INPUT, EXIT_DIFFERENT, EXIT_FAILED_FILE
+from mission.log import channels
 from mission.log.copying import write_copy
-from mission.log.reader import Flight, read_flight
-from mission.plan import MissionPlan
+from mission.log.reader import Flight, read_flight, stream_log
+from mission.log.records import VisionEntry
+from mission.records import ControlTick
 from mission.replay.differences import Tolerance, estimate_differences, setpoint_differences
-from mission.replay.guidance import replay_guidance
+from mission.replay.pairing import moments_of
 from mission.replay.replay import Replay, differences, replay, write_reference
 from tests.log.synthetic_flight import fly, write_log
 from tests.replay.golden import GOLDEN
+from tests.replay.own_estimates import replay_own_estimates
 from tests.support.command_line import lineflight
 from vision.records import LineEstimate
+
+REPORTS = channels.CHANNEL_OF[VisionEntry].topic
 
 
 @pytest.fixture(scope="module")
@@ -46,13 +52,61 @@ def test_on_one_computer_two_replays_are_the_same_to_the_bit(golden: Flight, rep
 
 def test_with_the_flights_own_estimates_every_setpoint_is_the_same_to_the_bit(golden: Flight) -> None:
     """Guidance alone: no tick is paired with another task, state or report than its own."""
-    assert golden.camera is not None
-    plan = MissionPlan.model_validate_json(golden.attachments["plan.json"])
-    told = sorted(golden.reports, key=lambda report: report.t_capture_ns + report.latency_ns)
-    ticks = list(replay_guidance(golden, plan, golden.camera, told))
+    ticks = replay_own_estimates(golden)
     assert len(ticks) > 300
     assert {tick.task for tick in ticks} == {"takeoff", "ascend", "move_until", "align", "follow_lines"}
     assert [tick.t_ns for tick in ticks if tick.replayed != tick.flown] == []
+
+
+@pytest.mark.parametrize("latency_ms", [0, 400])
+def test_a_tick_uses_the_reports_that_it_took_whatever_their_latency_says(tmp_path: Path, latency_ms: int) -> None:
+    """Over MAVLink a report is on its way for a while after vision made it, and may come a tick later."""
+
+    def change(topic: str, _: int, data: bytes) -> bytes:
+        if topic != REPORTS:
+            return data
+        return channels.encode(replace(channels.decode(topic, data), latency_ns=latency_ms * 1_000_000))
+
+    write_copy(GOLDEN, tmp_path / "late.mcap", [], lambda _: None, change)
+    ticks = replay_own_estimates(read_flight(tmp_path / "late.mcap"))
+    assert len(ticks) > 300
+    assert [tick.t_ns for tick in ticks if tick.replayed != tick.flown] == []
+
+
+def test_two_frames_of_one_time_are_told_apart(golden: Flight, tmp_path: Path) -> None:
+    """A computer under load stamps two frames with one time: each tick has its own of them all the same."""
+    told = [moment for moment in moments_of(golden).moments if moment.reports]
+    first, second = told[20].reports[0], told[21].reports[0]
+
+    def change(topic: str, _: int, data: bytes) -> bytes:
+        if topic != REPORTS or channels.decode(topic, data).seq != second.seq:
+            return data
+        return channels.encode(replace(channels.decode(topic, data), t_ns=first.t_capture_ns))
+
+    write_copy(GOLDEN, tmp_path / "twice.mcap", [], lambda _: None, change)
+    again = [moment for moment in moments_of(read_flight(tmp_path / "twice.mcap")).moments if moment.reports]
+    assert [[r.seq for r in moment.reports] for moment in again] == [[r.seq for r in moment.reports] for moment in told]
+    assert again[21].reports[0].t_capture_ns == first.t_capture_ns
+
+
+def test_a_log_that_was_sorted_by_time_is_paired_by_time_and_says_so(golden: Flight, tmp_path: Path) -> None:
+    kinds = (ControlTick, VehicleState, VisionEntry)
+    records = [(t_ns, record) for _, t_ns, record in stream_log(GOLDEN) if isinstance(record, kinds)]
+    topics = {channels.CHANNEL_OF[kind].topic for kind in kinds}
+    write_copy(
+        GOLDEN,
+        tmp_path / "sorted.mcap",
+        sorted(records, key=lambda record: record[0]),
+        lambda _: None,
+        lambda topic, _, data: None if topic in topics else data,
+    )
+    paired = moments_of(read_flight(tmp_path / "sorted.mcap"))
+    assert moments_of(golden).is_by_order
+    assert not paired.is_by_order
+    # In virtual time a report is there as soon as it is made: its latency tells all.
+    assert all(tick.replayed == tick.flown for tick in replay_own_estimates(golden, paired))
+    shown = lineflight("replay", tmp_path / "sorted.mcap")
+    assert "The log was sorted by time since it was flown" in " ".join(shown.out.split())
 
 
 def test_the_replay_is_near_to_what_was_flown(golden: Flight, replayed: Replay) -> None:
@@ -66,7 +120,7 @@ def test_the_replay_is_near_to_what_was_flown(golden: Flight, replayed: Replay) 
 
 
 def test_a_reference_of_which_nothing_is_left_does_not_pass(golden: Flight, replayed: Replay) -> None:
-    (words,) = differences(golden, Replay((), ())).beyond(Tolerance())
+    (words,) = differences(golden, Replay((), (), is_by_order=True)).beyond(Tolerance())
     assert "nothing of the reference is left" in words
     half = replace(replayed, ticks=replayed.ticks[::2])
     found = differences(golden, half).beyond(Tolerance())
@@ -121,7 +175,9 @@ def test_the_command_ends_with_6_where_the_reference_is_another(replayed: Replay
     )
     bare = tmp_path / "bare.mcap"
     strip_reference(GOLDEN, bare)
-    write_reference(read_flight(bare), Replay(reports, replayed.ticks), tmp_path / "moved.mcap", lambda _: None)
+    write_reference(
+        read_flight(bare), Replay(reports, replayed.ticks, is_by_order=True), tmp_path / "moved.mcap", lambda _: None
+    )
     ran = lineflight("replay", tmp_path / "moved.mcap")
     assert ran.code == EXIT_DIFFERENT
     assert "offsets differ by up to 5 px" in ran.out
