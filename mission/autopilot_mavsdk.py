@@ -1,4 +1,4 @@
-"""The autopilot over MAVLink, by MAVSDK's native binding. The only file that imports mavsdk.
+"""The autopilot over MAVLink, by MAVSDK's native binding: found, asked, and commanded. What it tells is another file.
 
 What the binding does that its documentation does not say: setpoints are repeated by a C++ thread whatever our event
 loop does; `offboard.start()` may return although the autopilot refused, so only the heartbeat's mode counts; and
@@ -9,7 +9,8 @@ import asyncio
 import contextlib
 import json
 import math
-from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
+from collections.abc import Awaitable, Callable, Mapping, Sequence
+from functools import partial
 from typing import Any, TypeVar
 
 from mavsdk import Autopilot as MavsdkKind
@@ -23,22 +24,20 @@ from mavsdk.asyncio.plugins.telemetry import TelemetryAsync
 from mavsdk.logging import log_subscribe
 from mavsdk.plugins.mavlink_direct import MavlinkMessage
 from mavsdk.plugins.param import ParamError, ParamResult
-from mavsdk.plugins.telemetry import FlightMode as MavsdkMode
-from mavsdk.plugins.telemetry import LandedState as MavsdkLanded
 
 from drivers.clock import Clock
 from mission.autopilot import (
     AutopilotError,
     AutopilotKind,
-    FlightMode,
     GlobalPoint,
     Identity,
-    LandedState,
     NoAnswerError,
     Setpoint,
     VehicleState,
 )
 from mission.records import ClockSync
+from mission.telemetry_mavsdk import AUTOPILOT_COMPONENT, MavsdkTelemetry
+from mission.time_sync import TimeSync
 
 T = TypeVar("T")
 
@@ -51,39 +50,11 @@ PARAMETER_TIMEOUT_S = 6.0
 """MAVSDK itself asks for a parameter six times, which takes 3 s for one that the autopilot does not have."""
 
 _IDENTIFY_POLL_S = 0.2
-_AUTOPILOT_COMPONENT = 1  # MAV_COMP_ID_AUTOPILOT1
-_FAILSAFE_STATES = (5, 6)  # MAV_STATE_CRITICAL, MAV_STATE_EMERGENCY
 _TELEMETRY_RATE_HZ = 50.0
 _STATUS_RATE_HZ = 5.0
 _BATTERY_RATE_HZ = 2.0
-_SYNC_PERIOD_S = 1.0
 
-_MODES = {
-    MavsdkMode.UNKNOWN: FlightMode.UNKNOWN,
-    MavsdkMode.READY: FlightMode.HOLD,
-    MavsdkMode.TAKEOFF: FlightMode.TAKEOFF,
-    MavsdkMode.HOLD: FlightMode.HOLD,
-    MavsdkMode.RETURN_TO_LAUNCH: FlightMode.RETURN,
-    MavsdkMode.LAND: FlightMode.LAND,
-    MavsdkMode.OFFBOARD: FlightMode.OFFBOARD,
-}
 _KINDS = {MavsdkKind.PX4: AutopilotKind.PX4, MavsdkKind.ARDUPILOT: AutopilotKind.ARDUPILOT}
-_LANDED = {
-    MavsdkLanded.UNKNOWN: LandedState.UNKNOWN,
-    MavsdkLanded.ON_GROUND: LandedState.ON_GROUND,
-    MavsdkLanded.TAKING_OFF: LandedState.TAKING_OFF,
-    MavsdkLanded.IN_AIR: LandedState.IN_AIR,
-    MavsdkLanded.LANDING: LandedState.LANDING,
-}
-_HEALTH_WORDS = {
-    "is_gyrometer_calibration_ok": "gyroscope calibration",
-    "is_accelerometer_calibration_ok": "accelerometer calibration",
-    "is_magnetometer_calibration_ok": "compass calibration",
-    "is_local_position_ok": "local position estimate",
-    "is_global_position_ok": "global position (GPS)",
-    "is_home_position_ok": "home position",
-    "is_armable": "the autopilot's own arming checks",
-}
 
 
 class MavsdkAutopilot:
@@ -104,60 +75,38 @@ class MavsdkAutopilot:
         self._clock = clock
         self._on_log = on_log
         self._on_sync = on_sync
-        self._asked_ns = 0
         self._mavsdk: Mavsdk | None = None
         self._system: Any = None
         self._action: Any = None
         self._offboard: Any = None
-        self._subscriptions: list[asyncio.Task[None]] = []
+        self._asking: asyncio.Task[None] | None = None
         self._reading: asyncio.Task[float] | None = None
         self._telemetry: Any = None
-        self._target: Setpoint | None = None
+        self._heard = MavsdkTelemetry(clock, on_log)
         self._kind = AutopilotKind.UNKNOWN
-        self._newest: dict[str, Any] = {"connected": True, "battery": None, "failsafe": False}
-        self._is_deaf = False
-        self._position_ns = 0
-        self._attitude_ns = 0
-        self._status_texts: list[str] = []
 
     @property
     def state(self) -> VehicleState | None:
         """The newest telemetry; None until position, attitude, mode and landed state were all seen."""
-        newest = self._newest
-        if any(key not in newest for key in ("position", "attitude", "mode", "landed", "armed")):
-            return None
-        position, velocity = newest["position"].position, newest["position"].velocity
-        attitude = newest["attitude"]
-        return VehicleState(
-            t_ns=min(self._position_ns, self._attitude_ns),
-            north_m=position.north_m,
-            east_m=position.east_m,
-            down_m=position.down_m,
-            v_north_m_s=velocity.north_m_s,
-            v_east_m_s=velocity.east_m_s,
-            v_down_m_s=velocity.down_m_s,
-            roll_rad=math.radians(attitude.roll_deg),
-            pitch_rad=math.radians(attitude.pitch_deg),
-            yaw_rad=math.radians(attitude.yaw_deg),
-            mode=_MODES.get(newest["mode"], FlightMode.OTHER),
-            is_armed=newest["armed"],
-            landed=_LANDED.get(newest["landed"], LandedState.UNKNOWN),
-            battery=newest["battery"],
-            is_connected=newest["connected"] and not self._is_deaf,
-            is_failsafe=newest["failsafe"],
-            is_position_ok=self._is_position_ok(),
-            boot_ns=int(attitude.timestamp_us) * 1000 if attitude.timestamp_us else None,
-        )
+        return self._heard.state
+
+    @property
+    def target(self) -> Setpoint | None:
+        """Where the autopilot says that it flies to; None while it has not said."""
+        return self._heard.target
+
+    def drain_status_texts(self) -> list[str]:
+        """The autopilot's own words since the last call, oldest first."""
+        return self._heard.drain_status_texts()
+
+    def missing_health(self) -> list[str]:
+        """What keeps the vehicle from arming, in words for a person; empty when it can arm."""
+        return self._heard.missing_health()
 
     @property
     def takes_off_in_offboard(self) -> bool:
         """Whether its own take-off shows as offboard, as ArduCopter's does; known once connected."""
         return self._kind is AutopilotKind.ARDUPILOT
-
-    @property
-    def target(self) -> Setpoint | None:
-        """Where the autopilot says that it flies to; None while it has not said."""
-        return self._target
 
     async def read_origin(self) -> GlobalPoint | None:
         """Where the local frame has its origin; None where the autopilot does not know."""
@@ -168,18 +117,6 @@ class MavsdkAutopilot:
         if not all(map(math.isfinite, (origin.latitude_deg, origin.longitude_deg, origin.altitude_m))):
             return None
         return GlobalPoint(math.radians(origin.latitude_deg), math.radians(origin.longitude_deg), origin.altitude_m)
-
-    def drain_status_texts(self) -> list[str]:
-        """The autopilot's own words since the last call, oldest first."""
-        texts, self._status_texts = self._status_texts, []
-        return texts
-
-    def missing_health(self) -> list[str]:
-        """What keeps the vehicle from arming, in words for a person; empty when it can arm."""
-        health = self._newest.get("health")
-        if health is None:
-            return ["health report"]
-        return [words for name, words in _HEALTH_WORDS.items() if not getattr(health, name)]
 
     async def connect(self) -> None:
         """Find the autopilot and start its streams."""
@@ -202,22 +139,14 @@ class MavsdkAutopilot:
         self._offboard = OffboardAsync(system)
         direct = MavlinkDirectAsync(system)
         telemetry = self._telemetry = TelemetryAsync(system)
-        streams: list[tuple[AsyncIterator[Any], Callable[[Any], None]]] = [
-            (telemetry.subscribe_position_velocity_ned(), self._take_position),
-            (telemetry.subscribe_attitude_euler(), self._take_attitude),
-            (telemetry.subscribe_flight_mode(), self._keep("mode")),
-            (telemetry.subscribe_landed_state(), self._keep("landed")),
-            (telemetry.subscribe_armed(), self._keep("armed")),
-            (telemetry.subscribe_health(), self._keep("health")),
-            (telemetry.subscribe_battery(), self._take_battery),
-            (telemetry.subscribe_status_text(), self._take_status_text),
-            (system.is_connected_state(), self._keep("connected")),
-            (direct.subscribe_message("HEARTBEAT"), self._take_heartbeat),
-            (direct.subscribe_message("POSITION_TARGET_LOCAL_NED"), self._take_target),
-            (direct.subscribe_message("TIMESYNC"), self._take_timesync),
-        ]
-        self._subscriptions = [asyncio.create_task(self._pump(stream, take)) for stream, take in streams]
-        self._subscriptions.append(asyncio.create_task(self._ask_time(direct)))
+        self._heard.listen(system, telemetry, direct)
+        time_sync = TimeSync(
+            self._clock, partial(self._send_timesync, direct, await system.get_system_id()), self._on_sync
+        )
+        self._heard.follow(
+            direct.subscribe_message("TIMESYNC"), lambda message: time_sync.take(json.loads(message.fields_json))
+        )
+        self._asking = asyncio.create_task(time_sync.ask())
         # ArduPilot streams nothing that was not asked for.
         rates: list[tuple[str, Callable[[float], Awaitable[None]], float]] = [
             ("positions", telemetry.set_rate_position_velocity_ned, _TELEMETRY_RATE_HZ),
@@ -299,10 +228,11 @@ class MavsdkAutopilot:
 
     async def close(self) -> None:
         """Let go of the link. Never changes what the vehicle does."""
-        for subscription in self._subscriptions:
-            subscription.cancel()
-        await asyncio.gather(*self._subscriptions, return_exceptions=True)
-        self._subscriptions = []
+        if self._asking is not None:
+            self._asking.cancel()
+            await asyncio.gather(self._asking, return_exceptions=True)
+            self._asking = None
+        await self._heard.close()
         if self._reading is not None:  # in a thread of its own, which must not find MAVSDK destroyed
             await asyncio.wait([self._reading], timeout=PARAMETER_TIMEOUT_S)
             await asyncio.gather(self._reading, return_exceptions=True)
@@ -324,74 +254,14 @@ class MavsdkAutopilot:
                 raise NoAnswerError(f"the autopilot did not answer when asked to {what}") from None
             raise AutopilotError(f"the autopilot refused to {what}: {words}") from None
 
-    def _is_position_ok(self) -> bool:
-        health = self._newest.get("health")
-        return health is not None and health.is_local_position_ok and health.is_global_position_ok
-
-    async def _pump(self, stream: AsyncIterator[Any], take: Callable[[Any], None]) -> None:
-        try:
-            async for item in stream:
-                try:
-                    take(item)
-                except Exception as error:  # one message that cannot be read must not end its stream
-                    self._on_log(f"{type(error).__name__} in a message: {error}")
-        finally:
-            # A stream that has ended tells an old truth for ever: without one of them the link is as good as lost.
-            self._is_deaf = True
-
-    def _keep(self, key: str) -> Callable[[Any], None]:
-        def take(item: Any) -> None:
-            self._newest[key] = item
-
-        return take
-
-    def _take_position(self, item: Any) -> None:
-        self._newest["position"] = item
-        self._position_ns = self._clock.now_ns()
-
-    def _take_attitude(self, item: Any) -> None:
-        self._newest["attitude"] = item
-        self._attitude_ns = self._clock.now_ns()
-
-    def _take_battery(self, item: Any) -> None:
-        percent = float(item.remaining_percent)
-        self._newest["battery"] = None if math.isnan(percent) else percent / 100
-
-    def _take_heartbeat(self, message: Any) -> None:
-        """MAVSDK's own streams leave out the state of the system, which tells a failsafe from a pilot's choice."""
-        if message.component_id == _AUTOPILOT_COMPONENT:
-            self._newest["failsafe"] = json.loads(message.fields_json).get("system_status") in _FAILSAFE_STATES
-
-    def _take_target(self, message: Any) -> None:
-        fields = json.loads(message.fields_json)
-        place = [fields.get(key) for key in ("x", "y", "z", "yaw")]
-        if all(isinstance(value, int | float) and math.isfinite(value) for value in place):
-            self._target = Setpoint(*place)
-
-    async def _ask_time(self, direct: Any) -> None:
-        """Ask the autopilot for its time, once a second. Nobody waits for the answers."""
-        while True:
-            self._asked_ns = self._clock.now_ns()
-            question = MavlinkMessage(
-                message_name="TIMESYNC",
-                target_system_id=1,
-                target_component_id=_AUTOPILOT_COMPONENT,
-                fields_json=json.dumps({"tc1": 0, "ts1": self._asked_ns}),
-            )
-            with contextlib.suppress(AutopilotError):
-                await self._call("tell its time", direct.send_message(question))
-            await asyncio.sleep(_SYNC_PERIOD_S)
-
-    def _take_timesync(self, message: Any) -> None:
-        """The autopilot asks for our time, too, which MAVSDK answers; what matters here are answers to our question."""
-        fields = json.loads(message.fields_json)
-        boot_ns, asked_ns = int(fields["tc1"]), int(fields["ts1"])
-        if boot_ns and asked_ns == self._asked_ns:
-            now_ns = self._clock.now_ns()
-            self._on_sync(ClockSync(now_ns, boot_ns - (asked_ns + now_ns) // 2, now_ns - asked_ns))
-
-    def _take_status_text(self, item: Any) -> None:
-        self._status_texts.append(str(item.text).strip())
+    async def _send_timesync(self, direct: Any, system_id: int, fields: Mapping[str, int]) -> None:
+        question = MavlinkMessage(
+            message_name="TIMESYNC",
+            target_system_id=system_id,
+            target_component_id=AUTOPILOT_COMPONENT,
+            fields_json=json.dumps(fields),
+        )
+        await self._call("tell its time", direct.send_message(question))
 
     def _take_log(self, level: Any, message: str, _file: str | None, _line: int) -> bool:
         self._on_log(f"{level.name}: {message}")

@@ -50,7 +50,7 @@ class ArduCopterFace(MavlinkFace):
         for name, value in IN_PX4_TERMS.items():
             autopilot.set_parameter(name, value)
         self.mode = CopterMode.STABILIZE
-        self._values = dict(PARAMETERS)
+        self._values = PARAMETERS | {"MAV_SYSID": self._system}
         self._target: tuple[float, float, float, float] | None = None
         self._is_taking_off = False
         self._was_armed = False

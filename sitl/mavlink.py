@@ -24,7 +24,7 @@ _KEPT_TEXTS = 8
 _FIRST_TEXT_S = 2.5  # after boot
 _HEARTBEAT_LOSS_S = 2.5
 _PARAMETERS_PER_SERVICE = 4
-_SYSTEM, _COMPONENT = 1, 1
+_COMPONENT = 1
 _GET_MESSAGE_INTERVAL, _SET_MESSAGE_INTERVAL, _REQUEST_MESSAGE = 510, 511, 512
 _REQUEST_CAPABILITIES = 520
 _ABOUT_MESSAGES = (_GET_MESSAGE_INTERVAL, _SET_MESSAGE_INTERVAL, _REQUEST_MESSAGE, _REQUEST_CAPABILITIES)
@@ -57,9 +57,11 @@ class MavlinkFace:
     def __init__(self, autopilot: SimAutopilot, *, first_beat_s: float = _FIRST_BEAT_S) -> None:
         """Speak for `autopilot`, whose streams begin `first_beat_s` [s] after now."""
         self._autopilot = autopilot
+        # As in PX4, a change counts from the next start on.
+        self._system = round(autopilot.parameters.get("MAV_SYS_ID"))
         streams = self._all_streams()
         self._outbox: list[bytes] = []
-        self._mavlink: Any = dialect.MAVLink(None, srcSystem=_SYSTEM, srcComponent=_COMPONENT)
+        self._mavlink: Any = dialect.MAVLink(None, srcSystem=self._system, srcComponent=_COMPONENT)
         self._streams = {stream.message_id: stream for stream in streams}
         first_s = autopilot.boot_s + first_beat_s
         self._due_s = {stream.message_id: first_s for stream in streams if stream.rate_hz > 0}
@@ -118,7 +120,7 @@ class MavlinkFace:
 
     def _receive(self, message: Any) -> None:
         handler = getattr(self, f"_on_{message.get_type().lower()}", None)
-        is_for_us = getattr(message, "target_system", 0) in (0, _SYSTEM) and getattr(
+        is_for_us = getattr(message, "target_system", 0) in (0, self._system) and getattr(
             message, "target_component", 0
         ) in (0, _COMPONENT)
         if handler is not None and is_for_us:
@@ -153,7 +155,7 @@ class MavlinkFace:
             self._autopilot.set_position_setpoint(message.x, message.y, message.z, yaw_rad)
 
     def _on_manual_control(self, message: Any) -> None:
-        if message.target in (0, _SYSTEM):
+        if message.target in (0, self._system):
             x, y, z, r = (value / 1000 for value in (message.x, message.y, message.z, message.r))
             self._autopilot.set_sticks(x, y, z, r)
 
