@@ -53,6 +53,8 @@ def import_log(
         refuse(f"{autopilot_log} cannot be laid beside {log}: {error}.")
     except CopyError as error:
         fail(str(error), EXIT_FAILED_FILE)
+    if alignment.log.breaks_off:
+        sys.stderr.write(f"{autopilot_log} breaks off; what there is of it was imported.\n")
     if alignment.log.is_damaged:
         sys.stderr.write(f"{autopilot_log} is damaged in places; what could be read of it was imported.\n")
     if alignment.unexplained_shift_m > _FAR_M:

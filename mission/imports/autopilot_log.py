@@ -32,7 +32,8 @@ class AutopilotLog:
     """What an autopilot logged between two starts of its own; `t_ns` in `records` is its time since it started.
 
     `records` are in the order of their times. `has_own_origin` says that its positions may be told from another origin
-    than those of its telemetry. `is_damaged` says that parts could not be read.
+    than those of its telemetry. `is_damaged` says that parts could not be read, `breaks_off` that the file shows
+    that it ends before its time.
     """
 
     kind: str
@@ -40,6 +41,7 @@ class AutopilotLog:
     vehicle: str
     has_own_origin: bool
     is_damaged: bool
+    breaks_off: bool
     records: tuple[ImportedRecord, ...]
 
     @property
@@ -88,7 +90,14 @@ class Collector:
                 return
 
     def log(
-        self, kind: str, version: str, vehicle: str, *, has_own_origin: bool = False, is_damaged: bool = False
+        self,
+        kind: str,
+        version: str,
+        vehicle: str,
+        *,
+        has_own_origin: bool = False,
+        is_damaged: bool = False,
+        breaks_off: bool = False,
     ) -> AutopilotLog:
         """All of it, in the order of times. Outputs after the last that ever turned are no motors."""
         told = [record.motors for record in self._records if isinstance(record, ImportedActuators)]
@@ -98,7 +107,7 @@ class Collector:
             for record in self._records
         )
         in_order = tuple(sorted(records, key=lambda record: record.t_ns))
-        return AutopilotLog(kind, version, vehicle, has_own_origin, is_damaged, in_order)
+        return AutopilotLog(kind, version, vehicle, has_own_origin, is_damaged, breaks_off, in_order)
 
 
 def measured(value: float, *, least: float = -math.inf) -> float | None:

@@ -45,7 +45,7 @@ def read_telemetry_log(path: Path, tell: Tell) -> list[AutopilotLog]:
     AutopilotLogError when no autopilot speaks in it; OSError when it cannot be opened.
     """
     runs = [_Telemetry()]
-    n_bad = 0
+    n_bad = end = 0
     os.environ["MAVLINK20"] = (
         "1"  # whose parser takes both versions; the library would settle on that of the first byte
     )
@@ -59,9 +59,11 @@ def read_telemetry_log(path: Path, tell: Tell) -> list[AutopilotLog]:
             elif not runs[-1].take(message):
                 runs.append(runs[-1].after_restart())
                 runs[-1].take(message)
+            end = source.f.tell()
+        breaks_off = end < source.filesize  # within a message, or the time before it
     if runs[-1].system is None:
         raise AutopilotLogError(f"{path} holds no message of an autopilot; name a telemetry log (.tlog).")
-    return [run.log(is_damaged=n_bad > 0) for run in runs]
+    return [run.log(is_damaged=n_bad > 0, breaks_off=breaks_off) for run in runs]
 
 
 class _Telemetry:
@@ -85,9 +87,9 @@ class _Telemetry:
         new.system, new._autopilot, new._version, new._uid = self.system, self._autopilot, self._version, self._uid
         return new
 
-    def log(self, *, is_damaged: bool) -> AutopilotLog:
+    def log(self, *, is_damaged: bool, breaks_off: bool) -> AutopilotLog:
         version = " ".join(part for part in (_KINDS.get(self._autopilot, ""), self._version) if part)
-        return self._collector.log("telemetry", version, self._uid, is_damaged=is_damaged)
+        return self._collector.log("telemetry", version, self._uid, is_damaged=is_damaged, breaks_off=breaks_off)
 
     def take(self, message: Any) -> bool:
         """Take a message; False when it shows that the autopilot was started anew, and has to go to the next run."""

@@ -1,16 +1,20 @@
 """Find out what kind of log a file is, and read it."""
 
+import enum
 import hashlib
 import lzma
 import tempfile
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from typing import BinaryIO
 
 from mission.imports.autopilot_log import AutopilotLog, Tell
 from mission.imports.errors import AutopilotLogError
 
 _ENDINGS = ".ulg (PX4), .bin (ArduPilot), .tlog or .tlog.xz (telemetry)"
-_BLOCK_BYTES = 1 << 20
+_BLOCK_BYTES = 4096  # small: what is unpacked of a block in which the damage lies is lost
+_MAX_PIECE_BYTES = 1 << 20
 _MAX_UNPACKED_BYTES = 4 << 30  # hours of telemetry; more is no log
 
 
@@ -81,15 +85,53 @@ def _read_packed_telemetry(path: Path, tell: Tell) -> list[AutopilotLog]:
     """Unpack it to a file of its own, which is what the library reads."""
     with tempfile.TemporaryDirectory() as folder:
         unpacked = Path(folder) / path.name.removesuffix(".xz")
-        try:
-            with lzma.open(path) as packed, unpacked.open("wb") as file:
-                while block := packed.read(_BLOCK_BYTES):
-                    if file.tell() > _MAX_UNPACKED_BYTES:
-                        raise AutopilotLogError(f"{path} unpacks to more than 4 GiB; that is no telemetry log.")
-                    file.write(block)
-        except (lzma.LZMAError, EOFError) as error:
-            raise AutopilotLogError(f"{path} cannot be unpacked ({error}); fetch it once more.") from error
-        return _read_telemetry_named(path, unpacked, tell)
+        with path.open("rb") as packed, unpacked.open("wb") as file:
+            flaw = _unpack(path, packed, file)
+        logs = _read_telemetry_named(path, unpacked, tell)
+    return [
+        replace(log, breaks_off=log.breaks_off or flaw is _Flaw.CUT, is_damaged=log.is_damaged or flaw is _Flaw.DAMAGED)
+        for log in logs
+    ]
+
+
+class _Flaw(enum.Enum):
+    """Why a packed file could not be unpacked to its end."""
+
+    CUT = enum.auto()
+    DAMAGED = enum.auto()
+
+
+def _unpack(path: Path, packed: BinaryIO, file: BinaryIO) -> _Flaw | None:
+    """Unpack an .xz file as far as it goes; None: to its end. Raises AutopilotLogError when there is nothing in it."""
+    unpacker = lzma.LZMADecompressor()
+    block = b""
+    try:
+        while True:
+            if unpacker.eof:
+                block = _next_stream(unpacker.unused_data, packed)
+                if not block:
+                    return None
+                unpacker = lzma.LZMADecompressor()
+            elif unpacker.needs_input and not (block := packed.read(_BLOCK_BYTES)):
+                flaw, words = _Flaw.CUT, "it breaks off"
+                break
+            file.write(unpacker.decompress(block, _MAX_PIECE_BYTES))
+            block = b""
+            if file.tell() > _MAX_UNPACKED_BYTES:
+                raise AutopilotLogError(f"{path} unpacks to more than 4 GiB; that is no telemetry log.")
+    except lzma.LZMAError as error:
+        flaw, words = _Flaw.DAMAGED, str(error)
+    if not file.tell():
+        raise AutopilotLogError(f"{path} cannot be unpacked ({words}); fetch it once more.")
+    return flaw
+
+
+def _next_stream(rest: bytes, packed: BinaryIO) -> bytes:
+    """The beginning of the stream that follows one, after zeros that may stand between; empty: none does."""
+    block = rest or packed.read(_BLOCK_BYTES)
+    while block and not block.strip(b"\0"):
+        block = packed.read(_BLOCK_BYTES)
+    return block.lstrip(b"\0")
 
 
 def _read_telemetry_named(path: Path, unpacked: Path, tell: Tell) -> list[AutopilotLog]:

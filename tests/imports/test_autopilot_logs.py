@@ -132,6 +132,51 @@ def test_a_packed_telemetry_log_is_the_same(flown: Flown, tmp_path: Path) -> Non
     assert len(digest(tmp_path / "a.tlog")) == 64
 
 
+def test_a_packed_telemetry_log_that_was_cut_is_read_up_to_there_and_says_so(flown: Flown, tmp_path: Path) -> None:
+    write_telemetry(tmp_path / "a.tlog", flown.frames[:4_000])
+    packed = lzma.compress((tmp_path / "a.tlog").read_bytes(), preset=0)
+    whole = read(tmp_path / "a.tlog")
+    assert not whole.breaks_off
+    for share in (0.9, 0.5):
+        (tmp_path / "cut.tlog.xz").write_bytes(packed[: int(share * len(packed))])
+        cut = read(tmp_path / "cut.tlog.xz")
+        assert cut.breaks_off
+        assert not cut.is_damaged
+        assert cut.states == whole.states[: len(cut.states)]
+        assert len(cut.states) == pytest.approx(share * len(whole.states), rel=0.1)
+
+
+def test_a_packed_telemetry_log_that_is_damaged_is_read_up_to_there_and_says_so(flown: Flown, tmp_path: Path) -> None:
+    write_telemetry(tmp_path / "a.tlog", flown.frames[:4_000])
+    packed = bytearray(lzma.compress((tmp_path / "a.tlog").read_bytes(), preset=0))
+    middle = len(packed) // 2
+    packed[middle : middle + 100] = random.Random(1).randbytes(100)
+    (tmp_path / "damaged.tlog.xz").write_bytes(packed)
+    whole, damaged = read(tmp_path / "a.tlog"), read(tmp_path / "damaged.tlog.xz")
+    assert damaged.is_damaged
+    assert len(damaged.states) > 0.4 * len(whole.states)
+
+
+def test_streams_that_were_packed_apart_are_one_log(flown: Flown, tmp_path: Path) -> None:
+    write_telemetry(tmp_path / "a.tlog", flown.frames[:4_000])
+    data = (tmp_path / "a.tlog").read_bytes()
+    middle = len(data) // 2
+    streams = [lzma.compress(part, preset=0) for part in (data[:middle], data[middle:])]
+    (tmp_path / "b.tlog.xz").write_bytes(bytes(10_000).join(streams))
+    assert read(tmp_path / "b.tlog.xz") == read(tmp_path / "a.tlog")
+
+
+@pytest.mark.parametrize("n_bytes", [1, 9, 20])
+def test_a_telemetry_log_that_ends_within_a_message_says_so(flown: Flown, tmp_path: Path, n_bytes: int) -> None:
+    frames = flown.frames[:4_001]
+    write_telemetry(tmp_path / "a.tlog", frames[:-1])
+    write_telemetry(tmp_path / "b.tlog", frames)
+    whole, longer = (tmp_path / "a.tlog").read_bytes(), (tmp_path / "b.tlog").read_bytes()
+    (tmp_path / "cut.tlog").write_bytes(longer[: len(whole) + n_bytes])
+    assert read(tmp_path / "cut.tlog").breaks_off
+    assert read(tmp_path / "cut.tlog").records == read(tmp_path / "a.tlog").records
+
+
 def test_other_vehicles_in_a_telemetry_log_are_left_out(flown: Flown, tmp_path: Path) -> None:
     other = dialect.MAVLink(None, srcSystem=7, srcComponent=1)
     strange = other.local_position_ned_encode(9_000, 500.0, 0.0, 0.0, 0.0, 0.0, 0.0).pack(other)
@@ -206,7 +251,8 @@ def test_damage_in_the_middle_costs_little_or_is_refused_in_a_sentence(
         ("a.tlog", b"some text that is no log at all", "holds no message of an autopilot"),
         ("a.tlog", struct.pack(">Q", 1) + b"\xfd" * 5_000, "holds no message of an autopilot"),
         ("a.tlog.xz", b"some text that is no log at all", "cannot be unpacked"),
-        ("a.tlog.xz", lzma.compress(bytes(100_000))[:60], "cannot be unpacked"),
+        ("a.tlog.xz", lzma.compress(bytes(100_000))[:20], "cannot be unpacked .it breaks off"),
+        ("a.tlog.xz", lzma.compress(bytes(100_000))[:60], r"a\.tlog\.xz holds no message of an autopilot"),
         ("a.tlog.xz", lzma.compress(b"text"), r"a\.tlog\.xz holds no message of an autopilot"),
         ("a.ulg", ulog_head(), "holds no position with attitude"),
         ("a.ulg", ulog_head()[:7], "is damaged"),

@@ -1,5 +1,6 @@
 """`lineflight import`, end to end: a flight's own log and the autopilot's, with clocks whose truth is known."""
 
+import lzma
 import random
 from collections.abc import Callable
 from dataclasses import replace
@@ -159,6 +160,19 @@ def test_a_log_of_ours_that_was_cut_off_stays_one(ours: Path, theirs: Path, tmp_
     assert flight.states == read_flight(cut).states
     assert imported.states[-1].t_ns > flight.states[-1].t_ns + 5 * 10**9
     assert flight.end_ns == read_flight(cut).end_ns
+
+
+def test_a_packed_log_that_was_cut_is_imported_and_the_cut_said(flown: Flown, ours: Path, tmp_path: Path) -> None:
+    write_telemetry(tmp_path / "whole.tlog", flown.frames)
+    packed = lzma.compress((tmp_path / "whole.tlog").read_bytes(), preset=0)
+    cut = tmp_path / "cut.tlog.xz"
+    cut.write_bytes(packed[: int(0.9 * len(packed))])
+    ran = lineflight("import", ours, cut, "--out", tmp_path / "out.mcap")
+    assert ran.code == 0, ran.err
+    assert ran.err == f"{cut} breaks off; what there is of it was imported.\n"
+    imported = read_flight(tmp_path / "out.mcap").imported
+    assert imported is not None
+    assert len(imported.states) > 100
 
 
 def test_what_exists_is_not_overwritten(ours: Path, theirs: Path, tmp_path: Path) -> None:
