@@ -33,6 +33,7 @@ class Vehicle:
     """
 
     __slots__ = (
+        "_shares",
         "_torque_n_m",
         "_weakness",
         "acceleration_m_s2",
@@ -64,16 +65,31 @@ class Vehicle:
         self.is_on_ground = True
         self.is_broken = False
         self.supply = 1.0
-        self._weakness = (0.0, 0.0, 0.0, 0.0)
+        self._shares = (1.0,) * len(self.airframe.rotors)
+        self._weakness = (
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+        )  # of the thrust: the share lost, and the torque that makes about x, y, z [m]
 
     def weaken(self, rotor: int, share: float) -> None:
         """Let one of the airframe's rotors give only a `share` of what is asked of it, 0 to 1: 1 mends it.
 
-        A worn bearing, a chipped propeller, a speed controller that has lost step: the autopilot does not know.
+        Each rotor keeps its own share until it is told another, so that several may be weak at once. A worn bearing, a
+        chipped propeller, a speed controller that has lost step: the autopilot does not know.
         """
-        forward_m, right_m, drag_m = self.airframe.rotors[rotor]
-        loss = (1.0 - share) / len(self.airframe.rotors)
-        self._weakness = (loss, loss * right_m, -loss * forward_m, -loss * drag_m)
+        rotors = self.airframe.rotors
+        shares = list(self._shares)
+        shares[rotor] = share
+        self._shares = tuple(shares)
+        losses = [(1.0 - each) / len(rotors) for each in self._shares]
+        self._weakness = (
+            sum(losses),
+            sum(loss * right_m for loss, (_, right_m, _) in zip(losses, rotors, strict=True)),
+            -sum(loss * forward_m for loss, (forward_m, _, _) in zip(losses, rotors, strict=True)),
+            -sum(loss * drag_m for loss, (_, _, drag_m) in zip(losses, rotors, strict=True)),
+        )
 
     @property
     def euler_rad(self) -> Vector:

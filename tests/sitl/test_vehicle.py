@@ -52,6 +52,34 @@ def test_thrust_lags_by_the_motors_time_constant() -> None:
     assert vehicle.thrust_n == pytest.approx(0.4 * vehicle.airframe.max_thrust_n * (1 - math.exp(-1)), rel=0.05)
 
 
+def motion_when_weak(*shares: tuple[int, float]) -> tuple[float, ...]:
+    """How fast it sinks and turns a tenth of a second after rotors of a hovering vehicle became weak."""
+    vehicle = aloft()
+    for rotor, share in shares:
+        vehicle.weaken(rotor, share)
+    run(vehicle, 0.1, vehicle.airframe.hover_thrust)
+    return (vehicle.velocity_m_s[2], *vehicle.rates_rad_s)
+
+
+def test_weak_rotors_add_up() -> None:
+    one, other = motion_when_weak((0, 0.9)), motion_when_weak((3, 0.7))
+    both = motion_when_weak((0, 0.9), (3, 0.7))
+    assert both == pytest.approx([a + b for a, b in zip(one, other, strict=True)], rel=0.02, abs=1e-3)
+    assert both == motion_when_weak((3, 0.7), (0, 0.2), (0, 0.9))  # a rotor has the share that it was told last
+
+
+def test_a_mended_rotor_leaves_the_others_weak() -> None:
+    assert motion_when_weak((0, 0.9), (3, 0.7), (3, 1.0)) == motion_when_weak((0, 0.9))
+    assert motion_when_weak((0, 0.5), (0, 1.0)) == motion_when_weak()
+
+
+def test_a_vehicle_that_is_weak_all_around_only_sinks() -> None:
+    n = len(Airframe().rotors)
+    sinks_m_s, *rates_rad_s = motion_when_weak(*[(rotor, 0.5) for rotor in range(n)])
+    assert sinks_m_s > 0.3
+    assert rates_rad_s == pytest.approx([0.0, 0.0, 0.0], abs=1e-9)
+
+
 def test_thrust_has_a_limit() -> None:
     vehicle = aloft()
     run(vehicle, 2.0, 7.0)
