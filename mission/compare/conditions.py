@@ -1,6 +1,7 @@
 """Conditions on a comparison's figures, as `lateral_p95_m>0.5` or `change:latency_p95_ms>20`. Pure."""
 
 import difflib
+import math
 import operator
 import re
 from collections.abc import Callable, Mapping, Sequence
@@ -8,7 +9,7 @@ from dataclasses import dataclass
 
 from mission.compare.figures import Figures
 
-_PATTERN = re.compile(r"\s*(change:)?\s*(\w+)\s*(<=|>=|<|>)\s*(-?\d+(?:\.\d*)?(?:[eE]-?\d+)?)\s*")
+_PATTERN = re.compile(r"\s*(change:)?\s*(\w+)\s*(<=|>=|<|>)\s*(\S+)\s*")
 _OPERATORS: Mapping[str, Callable[[float, float], bool]] = {
     "<": operator.lt,
     ">": operator.gt,
@@ -51,13 +52,25 @@ class Condition:
 def parse_condition(text: str, known: Sequence[str]) -> Condition:
     """Read a condition on one of the `known` figures. Raises ConditionError."""
     match = _PATTERN.fullmatch(text)
-    if match is None:
+    limit = None if match is None else _number(match[4])
+    if match is None or limit is None:
         raise ConditionError(
             f"'{text}' is no condition; write a figure, <, >, <= or >=, and a number: lateral_p95_m>0.5."
         )
-    change, name, sign, limit = match.groups()
+    change, name, sign, _ = match.groups()
+    if not math.isfinite(limit):
+        example = f"{change or ''}{name}{sign}0.5"
+        raise ConditionError(f"'{text}' would always hold, or never; write a finite number: {example}.")
     if name not in known:
         near = difflib.get_close_matches(name, known, n=1)
         hint = f"did you mean {near[0]}?" if near else f"there are {', '.join(sorted(known))}."
         raise ConditionError(f"There is no figure '{name}' in '{text}'; {hint}")
-    return Condition(name, sign, float(limit), change is not None)
+    return Condition(name, sign, limit, change is not None)
+
+
+def _number(text: str) -> float | None:
+    """A number as Python reads it, also `.5`, `1e+3` and `nan`; None for what is none."""
+    try:
+        return float(text)
+    except ValueError:
+        return None

@@ -91,6 +91,20 @@ def test_conditions(text: str, first: float | None, last: float | None, fails: b
     assert (condition.failure({"lateral_p95_m": first}, {"lateral_p95_m": last}) is not None) == fails
 
 
+@pytest.mark.parametrize("number", [".5", "5.", "+.5", "-.5e-3", "1e+3", "1E+03", "0", "-0.0", " 2 "])
+def test_a_number_is_whatever_float_reads(number: str) -> None:
+    assert parse_condition(f"lateral_p95_m>{number}", KNOWN).limit == float(number)
+
+
+@given(
+    st.floats(allow_nan=False, allow_infinity=False), st.sampled_from(["{!r}", "{:+}", "{:e}", "{:+.17E}", "{:.12f}"])
+)
+def test_every_way_in_which_python_writes_a_finite_number_is_read(limit: float, form: str) -> None:
+    number = form.format(limit)
+    for sign in ("<", ">", "<=", ">="):
+        assert parse_condition(f"change:lateral_p95_m{sign}{number}", KNOWN).limit == float(number)
+
+
 @pytest.mark.parametrize(
     ("text", "words"),
     [
@@ -99,6 +113,12 @@ def test_conditions(text: str, first: float | None, last: float | None, fails: b
         ("lateral_p95>0.5", "did you mean lateral_p95_m"),
         ("zzz>0.5", "there are latency_p95_ms, lateral_p95_m"),
         ("lateral_p95_m>0.5; rm -rf", "is no condition"),
+        ("lateral_p95_m>", "is no condition"),
+        ("lateral_p95_m>1e", "is no condition"),
+        ("lateral_p95_m>nan", "lateral_p95_m>nan' would always hold, or never; write a finite number"),
+        ("lateral_p95_m<-inf", "write a finite number: lateral_p95_m<0.5"),
+        ("change:lateral_p95_m>Infinity", "write a finite number: change:lateral_p95_m>0.5"),
+        ("lateral_p95_m>1e999", "write a finite number"),
     ],
 )
 def test_what_is_no_condition_is_refused_in_a_sentence(text: str, words: str) -> None:
