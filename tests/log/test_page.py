@@ -1,5 +1,6 @@
 """The page's data, without a browser: what is thinned keeps its peaks, what is told fits into the budget."""
 
+import html
 import json
 import math
 import re
@@ -116,6 +117,21 @@ def test_what_a_mission_says_cannot_break_out_of_the_page(flight: Flight) -> Non
     found = re.search(r'<script id="flight" type="application/json">(.*?)</script>', page, re.DOTALL)
     assert found is not None
     assert json.loads(found.group(1))["mission_text"] == evil
+
+
+@pytest.mark.parametrize(
+    "evil", ["<!-- <script>", "<!--<SCRIPT ", "</ScRiPt >", "a\u2028b\u2029c", "]]><![CDATA[", "\\u003c"]
+)
+def test_whatever_a_mission_is_called_its_data_stay_one_block(flight: Flight, evil: str) -> None:
+    """Between `<!--` and `<script` a browser does not end a script element where it should (HTML, 4.12.1.3)."""
+    named = replace(flight, mission=replace(flight.mission, name=evil, text=evil))
+    page = flight_page(named, inspect_flight(named))
+    begin = page.index('<script id="flight" type="application/json">')
+    data = page[page.index(">", begin) + 1 : page.index("</script>", begin)]
+    assert "<" not in data
+    assert data.isascii()
+    assert (json.loads(data)["name"], json.loads(data)["mission_text"]) == (evil, evil)
+    assert html.unescape(page[page.index("<title>") + 7 : page.index("</title>")]).startswith(evil)
 
 
 def test_an_imported_log_stands_in_the_page(flight: Flight) -> None:

@@ -38,7 +38,7 @@ def fill(name: str, title: str, data: dict[str, Any]) -> str:
     parts = {
         "%%TITLE%%": html.escape(title),
         "%%STYLE%%": _own("page.css"),
-        "%%DATA%%": json.dumps(data, separators=(",", ":"), allow_nan=False).replace("</", "<\\/"),
+        "%%DATA%%": _json_in_html(data),
         "%%SCRIPT%%": _own(f"{name}.js"),
         "%%PLOTLY%%": importlib.resources.files("plotly").joinpath("package_data/plotly.min.js").read_text("utf-8"),
     }
@@ -48,6 +48,16 @@ def fill(name: str, title: str, data: dict[str, Any]) -> str:
         before, page = page.split(mark, 1)
         pieces += [before, text]
     return "".join([*pieces, page])
+
+
+def _json_in_html(data: dict[str, Any]) -> str:
+    """JSON that may stand in a <script> element, whatever its strings hold.
+
+    There `</script` would end the element, and `<!--` with `<script` would keep it from ending (HTML, 4.12.1.3): so
+    every `<` is escaped, which JSON has in strings alone. What is beyond ASCII is escaped as well, U+2028 too, which
+    ends a line in older JavaScript.
+    """
+    return json.dumps(data, separators=(",", ":"), allow_nan=False, ensure_ascii=True).replace("<", "\\u003c")
 
 
 def _own(file: str) -> str:
