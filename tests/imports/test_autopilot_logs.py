@@ -1,14 +1,19 @@
 """Reading ULog, dataflash and telemetry logs: what was written comes back, and damage ends in a sentence."""
 
 import lzma
+import os
 import random
 import struct
+import subprocess
+import sys
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from pymavlink.dialects.v20 import all as dialect
+from pyulog import ULog
 
 from mission.imports.autopilot_log import AutopilotLog
 from mission.imports.errors import AutopilotLogError
@@ -87,6 +92,14 @@ def test_a_ulog_comes_back(flown: Flown, tmp_path: Path) -> None:
     assert of_type(log, ImportedText) == [ImportedText(9_000_000_000, "Takeoff detected")]
 
 
+def test_a_ulog_that_pyulog_wrote_tells_the_same(flown: Flown, tmp_path: Path) -> None:
+    """Another writer than ours: it writes every message of the format anew, topic after topic."""
+    write_ulog(tmp_path / "ours.ulg", flown)
+    ULog(str(tmp_path / "ours.ulg")).write_ulog(str(tmp_path / "theirs.ulg"))
+    assert (tmp_path / "theirs.ulg").read_bytes() != (tmp_path / "ours.ulg").read_bytes()
+    assert read(tmp_path / "theirs.ulg") == read(tmp_path / "ours.ulg")
+
+
 def test_a_dataflash_log_comes_back(flown: Flown, tmp_path: Path) -> None:
     write_dataflash(tmp_path / "a.bin", flown)
     log = read(tmp_path / "a.bin")
@@ -123,6 +136,17 @@ def test_a_telemetry_log_comes_back(flown: Flown, tmp_path: Path) -> None:
     said = [record.text for record in of_type(log, ImportedText)]
     assert "Takeoff detected" in said
     assert said == [text.strip() for text in said]
+
+
+def test_a_telemetry_log_that_mavlogdump_wrote_tells_the_same(flown: Flown, tmp_path: Path) -> None:
+    """Another writer than ours, of pymavlink's tools; it keeps times to 4 us."""
+    write_telemetry(tmp_path / "ours.tlog", flown.frames[:4_000])
+    tool = [sys.executable, str(Path(sys.executable).with_name("mavlogdump.py")), "--quiet", "--dialect", "all"]
+    files = ["--output", str(tmp_path / "theirs.tlog"), str(tmp_path / "ours.tlog")]
+    subprocess.run([*tool, *files], check=True, capture_output=True, env={**os.environ, "MAVLINK20": "1"})
+    for theirs, ours in zip(read(tmp_path / "theirs.tlog").records, read(tmp_path / "ours.tlog").records, strict=True):
+        assert theirs.t_ns == pytest.approx(ours.t_ns, rel=0, abs=10_000)
+        assert replace(theirs, t_ns=0) == replace(ours, t_ns=0)
 
 
 def test_a_packed_telemetry_log_is_the_same(flown: Flown, tmp_path: Path) -> None:
