@@ -8,8 +8,9 @@ from pathlib import Path
 from mcap.records import Attachment, Channel, Header, McapRecord, Message, Metadata, Schema
 from mcap.writer import Writer
 
-from drivers.mcap_stream import open_records
+from drivers.mcap_stream import McapFile
 from mission.log import channels
+from mission.log.damage import METADATA, as_metadata, damage_of
 from mission.log.errors import LogError
 
 _TELL_PERIOD = 1_000  # records
@@ -39,7 +40,7 @@ def write_copy(
 
     Messages go through `change` on their way. `records` are records of mission.log.channels with their log times [ns,
     Unix], in the order of these. `tell` hears how much of `source` has been read, 0 to 1. What stands under `out` is
-    whole: it is written under another name first.
+    whole: it is written under another name first. What is damaged in `source` is not copied, and the copy says so.
     Raises CopyError when it exists or cannot be written, LogError when `source` cannot be read.
     """
     if out.exists():
@@ -63,14 +64,19 @@ def write_copy(
 
 
 def _records(source: Path, tell: Callable[[float], None]) -> Iterator[McapRecord]:
-    """Every record of a log; raises LogError."""
+    """Every record of a log, and at its end what of it is damaged; raises LogError."""
     try:
         with source.open("rb") as file:
             n_bytes = max(source.stat().st_size, 1)
-            for index, record in enumerate(open_records(file)):
+            log = McapFile(file)
+            for index, record in enumerate(log.records()):
                 if index % _TELL_PERIOD == 0:
                     tell(file.tell() / n_bytes)
-                yield record
+                if not (isinstance(record, Metadata) and record.name == METADATA):
+                    yield record
+            damage = damage_of(log)
+            if damage is not None:
+                yield Metadata(METADATA, as_metadata(damage))
     except OSError as error:
         raise LogError(f"The log {source} cannot be read ({error.strerror}); is its disk still there?") from error
 

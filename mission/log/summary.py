@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from drivers.clock import NS_PER_S
+from mission.log.damage import words_of_damage
 from mission.log.measures import Floats, line_fit_distances_m, nearest_on_axis, offboard_gaps_s
 from mission.log.reader import Flight
 from mission.log.wording import words_of
@@ -147,7 +148,7 @@ class FlightReport:
     """A flight in figures. Times [s] are since the flight's start (`flight_start_ns`).
 
     `lateral` and `yaw_error` need ground truth, which only a simulated flight has. `excursions` are empty where nobody
-    looked for them (mission/log/inspection.py does).
+    looked for them (mission/log/inspection.py does). `damage` says in a sentence what of the log could not be read.
     """
 
     mission: str
@@ -165,6 +166,7 @@ class FlightReport:
     landing: LandingSummary | None
     events: tuple[EventSummary, ...]
     excursions: tuple[ExcursionSummary, ...] = ()
+    damage: str | None = None
 
 
 def summarise(flight: Flight) -> FlightReport:
@@ -209,6 +211,7 @@ def summarise(flight: Flight) -> FlightReport:
             EventSummary(since_start_s(event.t_ns), event.name, str(event.severity), event.message, event.reaction)
             for event in flight.events
         ),
+        damage=None if flight.damage is None else words_of_damage(flight.damage),
     )
 
 
