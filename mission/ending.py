@@ -1,6 +1,6 @@
 """How a command ends: what it prints last, and the exit code.
 
-Exit codes: 0 done · 1 a log could not be written, or some of the images not read · 2 bad input (a
+Exit codes: 0 done · 1 a log or the output could not be written, or some of the images not read · 2 bad input (a
 mission, world, camera, log or option that cannot be used), nothing was connected · 3 not ready, the vehicle was never
 armed · 4 the mission ended early · 5 the pilot, or the autopilot's failsafe, has the vehicle · 6 what was compared
 differs by more than is allowed · 70 a fault of lineflight's own · 130 stopped by the operator.
