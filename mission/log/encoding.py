@@ -66,7 +66,7 @@ class Encoder:
     """The channels of one flight.
 
     Each record goes to its own JSON channel, and where a viewer can show it, to Foxglove's own. Every sink of `context`
-    hears them. `newest_ns` is the newest time [ns, flight] of any record.
+    hears them. `newest_ns` is the newest time [ns, flight] of any record by our own clock.
     """
 
     def __init__(self, context: foxglove.Context, mission: LoggedMission) -> None:
@@ -114,7 +114,8 @@ class Encoder:
     def write_plain(self, record: Any) -> None:
         """Write a record as JSON; a channel with a rate limit skips what comes sooner."""
         t_ns = getattr(record, "t_ns", self._start_ns)
-        self.newest_ns = max(self.newest_ns, t_ns)
+        if not isinstance(record, channels.CAPTURE_TIMED):
+            self.newest_ns = max(self.newest_ns, t_ns)
         limit = self._limits.get(type(record))
         if limit is None or limit.admits(t_ns):
             self._log(self._json[type(record)], channels.encode(record), t_ns, is_lasting=type(record) in _LASTING)
@@ -266,7 +267,7 @@ _WRITE: dict[type, Callable[[Encoder, Any], None]] = {
 
 
 class McapLog:
-    """An MCAP file as an encoder's sink. `newest_ns` is the newest time [ns, flight] of any record."""
+    """An MCAP file as an encoder's sink. `newest_ns` is the encoder's."""
 
     def __init__(self, file: LogFile, mission: LoggedMission) -> None:
         context = foxglove.Context()
@@ -288,7 +289,7 @@ class McapLog:
 
     @property
     def newest_ns(self) -> int:
-        """The newest time [ns, flight] of any record."""
+        """The newest time [ns, flight] of any record by our own clock."""
         return self._encoder.newest_ns
 
     def write(self, record: object) -> None:

@@ -47,6 +47,7 @@ from mission.replay.records import ReplayedEstimate, ReplayedSetpoint
 from vision.records import VisionReport
 
 _IMPORTED = (ImportedState, ImportedSetpoint, ImportedActuators, ImportedPower, ImportedText, ImportedMode)
+_NOT_FLOWN = (*_IMPORTED, *channels.CAPTURE_TIMED)  # whose times do not tell when the flight ended
 
 
 @dataclass(frozen=True, slots=True)
@@ -226,7 +227,7 @@ def _flight(path: Path, streams: dict[type, list[Any]], jpegs: dict[int, bytes],
     times_ns = [
         records[-1].t_ns
         for kind, records in streams.items()
-        if records and hasattr(records[-1], "t_ns") and kind not in _IMPORTED
+        if records and hasattr(records[-1], "t_ns") and kind not in _NOT_FLOWN
     ]
     ended, lines, origins = streams[MissionEnded], streams[TrueLine], streams[Origin]
     return Flight(

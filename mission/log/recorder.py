@@ -108,6 +108,8 @@ class Recorder:
                     self._write(log, self._health(log.newest_ns, self._file))
                     log.flush()
                     next_flush_s = time.monotonic() + _FLUSH_PERIOD_S
+            log.flush()
+            self._write(log, self._health(log.newest_ns, self._file))  # once more, of the whole log
             log.close()
         except Exception as error:
             self._fault = f"The log {self.path} was given up: {type(error).__name__}: {error}."

@@ -7,7 +7,7 @@ import random
 import subprocess
 import sys
 import time
-from dataclasses import fields
+from dataclasses import fields, replace
 from datetime import UTC, datetime, timedelta, timezone
 from pathlib import Path
 
@@ -377,3 +377,23 @@ def test_a_missing_log_and_a_folder_are_refused_in_a_sentence(tmp_path: Path) ->
         read_flight(tmp_path / "nothing.mcap")
     with pytest.raises(LogError, match="is a folder; name one of the"):
         read_flight(tmp_path)
+
+
+def test_the_log_tells_at_its_end_how_it_did_as_a_whole(
+    flown: list[tuple[int, object]], log: Path, tmp_path: Path
+) -> None:
+    last = read_flight(log).health[-1]
+    assert (last.n_waiting, last.n_dropped_images, last.n_dropped_records) == (0, 0, 0)
+    assert 0.95 * log.stat().st_size < last.n_bytes < log.stat().st_size
+    assert last.t_ns == max(state.t_ns for state in of_type(flown, VehicleState))  # type: ignore[attr-defined]
+
+
+def test_a_frame_from_the_far_future_makes_no_flight_longer(flown: list[tuple[int, object]], tmp_path: Path) -> None:
+    (report,) = [item for _, item in flown if isinstance(item, VisionReport)][:1]
+    late = replace(report, t_capture_ns=START_NS + 10**6 * NS_PER_S)
+    path = tmp_path / "a.mcap"
+    write_log(path, [*flown[:500], (0, late)])
+    flight = read_flight(path)
+    assert flight.reports[-1].t_capture_ns == late.t_capture_ns
+    assert flight.end_ns < START_NS + 100 * NS_PER_S
+    assert flight.health[-1].t_ns < START_NS + 100 * NS_PER_S
