@@ -11,7 +11,7 @@ from drivers.clock import Clock, ScaledClock
 from mission.autopilot import Setpoint
 from mission.log.backlog import Backlog
 from mission.log.disk import LogFile
-from mission.log.encoding import McapLog
+from mission.log.mcap_log import McapLog
 from mission.log.records import LoggedMission, LogHealth, SentSetpoint, StatusText
 
 _MAX_RECORDS = 20_000  # a minute or more of all streams
