@@ -16,11 +16,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap.reader import make_reader
+from mcap.writer import Writer
 
 from drivers.clock import NS_PER_S
+from drivers.mcap_stream import McapFile
 from mission.autopilot import Setpoint, VehicleState
 from mission.log import channels
 from mission.log.backlog import Backlog
+from mission.log.copying import Copier
 from mission.log.disk import log_path
 from mission.log.errors import LogError
 from mission.log.imported import (
@@ -397,3 +400,27 @@ def test_a_frame_from_the_far_future_makes_no_flight_longer(flown: list[tuple[in
     assert flight.reports[-1].t_capture_ns == late.t_capture_ns
     assert flight.end_ns < START_NS + 100 * NS_PER_S
     assert flight.health[-1].t_ns < START_NS + 100 * NS_PER_S
+
+
+def test_a_log_copied_behind_itself_says_once_what_it_says_once(log: Path, tmp_path: Path) -> None:
+    whole, path = read_flight(log), tmp_path / "twice.mcap"
+    later_ns = 1000 * NS_PER_S
+    with path.open("wb") as file:
+        writer = Writer(file)
+        copier = Copier(writer)
+        for k in range(2):
+            with log.open("rb") as source:
+                for record in McapFile(source).records():
+                    copier.copy(record, later_ns=k * later_ns)
+        writer.finish()
+    twice = read_flight(path)
+    assert twice.damage is None
+    assert len(twice.states) == 2 * len(whole.states)
+    assert twice.attachments == whole.attachments
+    with path.open("rb") as file:
+        summary = make_reader(file, validate_crcs=True).get_summary()
+    assert summary is not None
+    assert summary.statistics is not None
+    assert (summary.statistics.attachment_count, summary.statistics.metadata_count) == (1, 1)
+    first_ns, last_ns = summary.statistics.message_start_time, summary.statistics.message_end_time
+    assert last_ns - first_ns == later_ns + whole.end_ns - START_NS
