@@ -30,16 +30,21 @@ _FIXED_BYTES = {1: 8, 5: 4}
 class Damage:
     """What could not be read of a file: `n_skipped` of its `n_parts` chunks and attachments.
 
-    Between the messages before and after them lie `missing_ns` of log time; more where not `is_all_known`. `n_nameless`
-    messages are sound, but what channel they belong to stood in a damaged part. Without any of these only what says
-    where things lie is damaged: nothing is missing.
+    `holes_ns` are the log times [ns, Unix] of the messages before and after them; there are more where not
+    `is_all_known`. `n_nameless` messages are sound, but what channel they belong to stood in a damaged part. Without
+    any of these only what says where things lie is damaged: nothing is missing.
     """
 
     n_skipped: int
     n_parts: int
-    missing_ns: int
+    holes_ns: tuple[tuple[int, int], ...]
     is_all_known: bool
     n_nameless: int
+
+    @property
+    def missing_ns(self) -> int:
+        """How much time lies in the holes [ns]."""
+        return sum(after_ns - before_ns for before_ns, after_ns in self.holes_ns)
 
 
 class McapFile:
@@ -61,7 +66,7 @@ class McapFile:
         self._topics: dict[int, str] = {}
         self._n_sound = self._n_unsound = self._n_nameless = 0
         self._is_flawed = False  # in a place that holds none of the messages
-        self._missing_ns = 0
+        self._holes_ns: list[tuple[int, int]] = []
         self._is_all_known = True
         self._last_ns: int | None = None
         self._is_after_gap = False
@@ -76,8 +81,8 @@ class McapFile:
         if not (n_skipped or self._n_unsound or self._n_nameless or self._is_flawed):
             return None
         if n_skipped == 0:  # it was an index that could not be read
-            return Damage(0, n_parts, 0, is_all_known=True, n_nameless=self._n_nameless)
-        return Damage(n_skipped, n_parts, self._missing_ns, self._is_all_known, self._n_nameless)
+            return Damage(0, n_parts, (), is_all_known=True, n_nameless=self._n_nameless)
+        return Damage(n_skipped, n_parts, tuple(self._holes_ns), self._is_all_known, self._n_nameless)
 
     def messages(self) -> Iterator[tuple[str, int, bytes]]:
         """Topic, log time [ns, Unix] and body of each message, in the order written."""
@@ -214,8 +219,8 @@ class McapFile:
     def _miss(self, before_ns: int | None, after_ns: int | None) -> None:
         if before_ns is None or after_ns is None:
             self._is_all_known = False
-        else:
-            self._missing_ns += max(0, after_ns - before_ns)
+        elif after_ns > before_ns:
+            self._holes_ns.append((before_ns, after_ns))
 
     def _topic(self, channel_id: int) -> str | None:
         topic = self._topics.get(channel_id)

@@ -17,14 +17,15 @@ def damage_of(log: McapFile) -> Damage | None:
     inherited = log.metadata.get(METADATA)
     if inherited is None:
         return log.damage
-    before = Damage(**json.loads(inherited["damage"]))
+    fields = json.loads(inherited["damage"])
+    before = Damage(**fields | {"holes_ns": tuple((begin, end) for begin, end in fields["holes_ns"])})
     now = log.damage
     if now is None:
         return before
     return Damage(
         before.n_skipped + now.n_skipped,
         before.n_parts + now.n_parts,
-        before.missing_ns + now.missing_ns,
+        before.holes_ns + now.holes_ns,
         is_all_known=before.is_all_known and now.is_all_known,
         n_nameless=before.n_nameless + now.n_nameless,
     )

@@ -2,6 +2,7 @@
 
 from collections import Counter
 from dataclasses import asdict, dataclass
+from itertools import zip_longest
 from typing import Any
 
 import numpy as np
@@ -226,12 +227,18 @@ def to_json(report: FlightReport) -> dict[str, Any]:
 
 
 def task_spans(flight: Flight) -> tuple[TaskSpan, ...]:
-    """Pair each task's start with its end, in the order flown."""
+    """Pair each task's start with its end, in the order flown.
+
+    One whose end the log lacks ended by when the next one began, if one did: that part of the log is damaged.
+    """
     unpaired: list[TaskEnded] = list(flight.tasks_ended)
     spans = []
-    for started in flight.tasks_started:
+    for started, following in zip_longest(flight.tasks_started, flight.tasks_started[1:]):
         ended = next((end for end in unpaired if end.index == started.index and end.t_ns >= started.t_ns), None)
-        if ended is None:
+        if ended is None and following is not None:
+            why = "Its end stood in a part of the log that is damaged."
+            spans.append(TaskSpan(started.task, started.t_ns, following.t_ns, UNFINISHED, why))
+        elif ended is None:
             spans.append(TaskSpan(started.task, started.t_ns, None, UNFINISHED, "The log breaks off before its end."))
         else:
             unpaired.remove(ended)

@@ -14,9 +14,12 @@ from mcap.stream_reader import StreamReader, breakup_chunk
 
 from drivers.clock import NS_PER_S
 from drivers.mcap_stream import open_messages
+from mission.log.blame.blame import find_excursions
+from mission.log.blame.records import Kind
 from mission.log.copying import write_copy
 from mission.log.damage import words_of_damage
 from mission.log.errors import LogError
+from mission.log.inspection import inspect_flight
 from mission.log.reader import Flight, find_damage, read_flight, read_images, stream_log
 from tests.log.synthetic_flight import fly, write_log
 from tests.support.command_line import lineflight
@@ -220,3 +223,14 @@ def test_a_log_of_which_nothing_is_left_is_refused_in_a_sentence(log: Path, tmp_
         read_flight(path)
     check_sentence(str(raised.value))
     assert ("is damaged" if begin else "is not an MCAP file") in str(raised.value)
+
+
+def test_nobody_is_blamed_for_what_stood_in_a_damaged_part(tmp_path: Path) -> None:
+    log, path = tmp_path / "a.mcap", tmp_path / "b.mcap"
+    assert write_log(log, list(fly())).failure is None
+    assert inspect_flight(read_flight(log)).excursions == ()
+    size = log.stat().st_size
+    path.write_bytes(flipped(flipped(log.read_bytes(), size // 2), size * 5 // 7))
+    flight = read_flight(path)
+    assert Kind.UNSEEN in {excursion.kind for excursion in find_excursions(flight)}  # if one looks at records alone
+    assert inspect_flight(flight).excursions == ()
