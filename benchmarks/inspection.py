@@ -13,16 +13,17 @@ import sys
 import tempfile
 import time
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
-from mcap.records import Attachment, Channel, Header, Message, Metadata, Schema
 from mcap.writer import Writer
 
 from benchmarks.page import PAGE, table, write_section
 from drivers.clock import NS_PER_S
-from drivers.mcap_stream import open_records
+from drivers.mcap_stream import McapFile
 from mission.log import channels
+from mission.log.copying import Copier
 from mission.log.reader import read_flight
 from mission.log.records import LoggedMission
 from mission.plan_file import read_mission
@@ -52,43 +53,19 @@ def stretch(log: Path, out: Path, minutes: float) -> None:
     n_times = round(minutes * 60 * NS_PER_S / span_ns)
     with out.open("wb") as target:
         writer = Writer(target)
+        copier = Copier(writer)
         for k in range(n_times):
-            _copy(log, writer, k * span_ns, is_first=k == 0, is_last=k == n_times - 1)
+            later_ns = k * span_ns
+            shifted = partial(_shifted, later_ns, is_first=k == 0, is_last=k == n_times - 1)
+            with log.open("rb") as source:
+                for record in McapFile(source).records():
+                    copier.copy(record, shifted, later_ns)
         writer.finish()
 
 
-_ids: dict[tuple[str, int], int] = {}
-
-
-def _copy(log: Path, writer: Writer, shift_ns: int, *, is_first: bool, is_last: bool) -> None:
-    topics: dict[int, str] = {}
-    if is_first:
-        _ids.clear()
-    with log.open("rb") as source:
-        for record in open_records(source):
-            if isinstance(record, Header) and is_first:
-                writer.start(record.profile, record.library)
-            elif isinstance(record, Schema) and ("schema", record.id) not in _ids:
-                _ids["schema", record.id] = writer.register_schema(record.name, record.encoding, record.data)
-            elif isinstance(record, Channel):
-                topics[record.id] = record.topic
-                if ("channel", record.id) not in _ids:
-                    schema_id = _ids["schema", record.schema_id]
-                    _ids["channel", record.id] = writer.register_channel(
-                        record.topic, record.message_encoding, schema_id, record.metadata
-                    )
-            elif isinstance(record, Attachment) and is_first:
-                writer.add_attachment(record.create_time, record.log_time, record.name, record.media_type, record.data)
-            elif isinstance(record, Metadata) and is_first:
-                writer.add_metadata(record.name, record.metadata)
-            elif isinstance(record, Message):
-                data = _shifted(topics[record.channel_id], record.data, shift_ns, is_first=is_first, is_last=is_last)
-                if data is not None:
-                    at_ns = record.log_time + shift_ns
-                    writer.add_message(_ids["channel", record.channel_id], at_ns, data, at_ns)
-
-
-def _shifted(topic: str, data: bytes, shift_ns: int, *, is_first: bool, is_last: bool) -> bytes | None:
+def _shifted(
+    shift_ns: int, topic: str, _log_time_ns: int, data: bytes, *, is_first: bool, is_last: bool
+) -> bytes | None:
     """A message at a later time; None for what a log holds once, and has already."""
     if topic not in channels.CHANNEL_AT:
         return data

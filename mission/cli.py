@@ -15,6 +15,7 @@ from mission.export_commands import app as export_app
 from mission.fly_commands import MissionArgument
 from mission.simulated.world_commands import app as world_app
 from mission.simulated.world_pictures import app as pictures_app
+from mission.terminal import OutputLostError, forget_output, watch_output
 
 app = typer.Typer(
     help="Fly a multirotor along a power line by sight.",
@@ -44,8 +45,20 @@ app.command("import")(import_commands.import_log)
 
 def main() -> None:
     """Run the command line. A fault of our own ends in a sentence too, and its traceback in a file."""
+    watch_output()
     try:
-        app()
+        try:
+            app()
+        finally:
+            if sys.stdout is not None:  # it was closed before we began
+                sys.stdout.flush()
+    except BrokenPipeError:
+        forget_output()
+        sys.exit(EXIT_FAILED_FILE)
+    except OutputLostError as error:
+        forget_output()
+        sys.stderr.write(f"{error}\n")
+        sys.exit(EXIT_FAILED_FILE)
     except Exception as error:
         trace = Path(tempfile.gettempdir()) / "lineflight-fault.txt"
         trace.write_text(traceback.format_exc(), encoding="utf-8")

@@ -1,9 +1,9 @@
 """How a command ends: what it prints last, and the exit code.
 
-Exit codes: 0 done · 1 a log could not be written, or some of the images not read · 2 bad input (a mission, world,
-camera, log or option that cannot be used), nothing was connected · 3 not ready, the vehicle was never armed · 4 the
-mission ended early · 5 the pilot, or the autopilot's failsafe, has the vehicle · 6 what was compared differs by more
-than is allowed · 70 a fault of lineflight's own · 130 stopped by the operator.
+Exit codes: 0 done · 1 a log or the output could not be written, or some of the images not read · 2 bad input (a
+mission, world, camera, log or option that cannot be used), nothing was connected · 3 not ready, the vehicle was never
+armed · 4 the mission ended early · 5 the pilot, or the autopilot's failsafe, has the vehicle · 6 what was compared
+differs by more than is allowed · 70 a fault of lineflight's own · 130 stopped by the operator.
 """
 
 import json
@@ -16,6 +16,7 @@ import typer
 from mission.log.errors import LogError
 
 if TYPE_CHECKING:
+    from drivers.mcap_stream import Damage
     from mission.flight import FlightOutcome
     from mission.log.summary import FlightReport
     from mission.plan_file import MissionFile
@@ -51,6 +52,14 @@ def read_mission(path: Path) -> "MissionFile":
         return read_mission(path)
     except MissionFileError as error:
         fail("\n".join(error.lines()), EXIT_BAD_INPUT)
+
+
+def tell_damage(log: Path, damage: "Damage | None") -> None:
+    """Say what could not be read of a log, if anything."""
+    from mission.log.damage import words_of_damage
+
+    if damage is not None:
+        sys.stderr.write(f"{log}: {words_of_damage(damage)}\n")
 
 
 def read_report(log: Path) -> "FlightReport":

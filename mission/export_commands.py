@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mission.ending import EXIT_FAILED_FILE, fail, refuse
+from mission.ending import EXIT_FAILED_FILE, fail, refuse, tell_damage
 from mission.export.errors import ExportError, OutputError
 from mission.log.errors import LogError
 
@@ -27,7 +27,7 @@ def export_csv(log: LogArgument, folder: FolderArgument) -> None:
     """Write a table for each stream of records, as CSV."""
     from mission.export.tables import CsvTable, export_tables
 
-    with _sentences(), _progress("records") as advance:
+    with _sentences(log), _progress("records") as advance:
         n_rows = export_tables(log, folder, ".csv", CsvTable, advance)
     _say_tables(folder, n_rows)
 
@@ -41,7 +41,7 @@ def export_parquet(log: LogArgument, folder: FolderArgument) -> None:
         refuse("Parquet needs pyarrow, which is not installed; install it with: pip install 'lineflight[parquet]'.")
     from mission.export.tables import export_tables
 
-    with _sentences(), _progress("records") as advance:
+    with _sentences(log), _progress("records") as advance:
         n_rows = export_tables(log, folder, ".parquet", ParquetTable, advance)
     _say_tables(folder, n_rows)
 
@@ -74,7 +74,7 @@ def export_images(
         from mission.export.images import export_images
     except ModuleNotFoundError:
         refuse("EXIF needs Pillow, which is not installed; install it with: pip install 'lineflight[export]'.")
-    with _sentences(), _progress("images") as advance:
+    with _sentences(log), _progress("images") as advance:
         written = export_images(log, folder, task=task, every=every, on_image=advance)
     typer.echo(f"{folder}: {written.n_images} images, and their poses for COLMAP in {folder / 'sparse' / '0'}")
     if written.n_without_pose:
@@ -89,7 +89,7 @@ def _write_map(log: Path, file: Path, suffixes: tuple[str, ...], written: "Calla
 
     if file.suffix.lower() not in suffixes:
         refuse(f"FILE is '{file}'; name a file that ends in {' or '.join(suffixes)}.")
-    with _sentences():
+    with _sentences(log):
         with _progress("map"):
             flight_map = read_map(log)
         write_new_file(file, written(flight_map))
@@ -115,10 +115,16 @@ def _say_tables(folder: Path, n_rows: dict[str, int]) -> None:
 
 
 @contextmanager
-def _sentences() -> Iterator[None]:
-    """End the command with the sentence and the exit code that an error of the export stands for."""
+def _sentences(log: Path) -> Iterator[None]:
+    """End the command with the sentence and the exit code that an error of the export stands for.
+
+    What of the log is damaged, and so not exported, is said too.
+    """
+    from mission.log.reader import find_damage
+
     try:
         yield
+        tell_damage(log, find_damage(log))
     except (LogError, ExportError) as error:
         refuse(str(error))
     except OutputError as error:

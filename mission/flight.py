@@ -49,9 +49,9 @@ _WATCH_RATE_HZ = 10.0
 class FlightSetup:
     """What a flight is made of. `open_camera` is called in the vision worker.
 
-    `true_line` and `true_pose` are known for a simulated vehicle alone; `feed_pose` gets the telemetry where a camera
-    is simulated for a vehicle that flies elsewhere. `remaining` is what is left of a mission that is resumed, and
-    `resumption` where.
+    `true_line` and `truth` are known for a simulated vehicle alone: `truth` tells where it truly is, and what it has
+    touched since it was last asked. `feed_pose` gets the telemetry where a camera is simulated for a vehicle that flies
+    elsewhere. `remaining` is what is left of a mission that is resumed, and `resumption` where.
     """
 
     mission: MissionFile
@@ -61,7 +61,7 @@ class FlightSetup:
     log_folder: Path
     metadata: dict[str, str]
     true_line: TrueLine | None = None
-    true_pose: Callable[[], TruePose | None] | None = None
+    truth: Callable[[], Sequence[TruePose | Event]] | None = None
     feed_pose: Callable[[VehicleState], None] | None = None
     remaining: MissionPlan | None = None
     resumption: Resumption | None = None
@@ -151,8 +151,8 @@ async def fly(
                 asyncio.create_task(surroundings.watch()),
                 asyncio.create_task(_every(_PROGRESS_RATE_HZ, 1.0, lambda: on_progress(executive.progress))),
             ]
-            if setup.true_pose is not None:
-                sides.append(asyncio.create_task(_record_truth(setup.true_pose, log, clock)))
+            if setup.truth is not None:
+                sides.append(asyncio.create_task(_record_truth(setup.truth, log, clock)))
             if setup.feed_pose is not None:
                 sides.append(asyncio.create_task(_feed(setup.feed_pose, autopilot)))
             if live is not None:
@@ -218,13 +218,15 @@ async def _every(rate_hz: float, speed: float, act: Callable[[], None]) -> None:
         await asyncio.sleep(1.0 / (rate_hz * speed))
 
 
-async def _record_truth(true_pose: Callable[[], TruePose | None], log: FlightLog, clock: ScaledClock) -> None:
+async def _record_truth(truth: Callable[[], Sequence[TruePose | Event]], log: FlightLog, clock: ScaledClock) -> None:
     def act() -> None:
-        pose = true_pose()
-        if pose is not None:
-            log.record(pose)
+        for record in truth():
+            log.record(record)
 
-    await _every(_TRUTH_RATE_HZ, clock.speed, act)
+    try:
+        await _every(_TRUTH_RATE_HZ, clock.speed, act)
+    finally:  # what it touched last belongs to the flight, too
+        act()
 
 
 async def be_watched(live: LiveFeed, executive: Executive, log: FlightLog, clock: ScaledClock) -> None:

@@ -130,7 +130,7 @@ def _fly_beside(
             }
             | scenario.metadata,
             true_line=true_line(simulation.world),
-            true_pose=simulation.true_pose,
+            truth=simulation.truth,
         )
         outcome = _fly_watched(setup, watched)
     finish(outcome, as_json=as_json, aftermath=simulation.aftermath)

@@ -14,7 +14,7 @@ from sitl.place import Origin
 from sitl.pose import Pose, PoseBlock
 from sitl.udp import UdpLink
 from sitl.vehicle import Vehicle
-from sitl.witness import Testimony, Witness
+from sitl.witness import Contact, Testimony, Witness
 from sitl.world.file import load_world
 
 AutopilotName = Literal["px4", "arducopter"]
@@ -66,8 +66,10 @@ class SitlSummary:
         return self.simulated_s / self.wall_s if self.wall_s > 0 else 0.0
 
 
-def run(settings: SitlSettings, should_stop: Callable[[], bool]) -> SitlSummary:
-    """Fly until `should_stop` says so.
+def run(
+    settings: SitlSettings, should_stop: Callable[[], bool], tell_contact: Callable[[Contact], None] | None = None
+) -> SitlSummary:
+    """Fly until `should_stop` says so; `tell_contact` hears at once what the vehicle touches.
 
     Raises OSError when the port is taken, FileNotFoundError without a pose block, and what load_world and outfit raise.
 
@@ -78,7 +80,7 @@ def run(settings: SitlSettings, should_stop: Callable[[], bool]) -> SitlSummary:
     world = (
         open_field(settings.origin, settings.start_yaw_rad) if settings.world is None else load_world(settings.world)
     )
-    witness = Witness(Obstacles(world))
+    witness = Witness(Obstacles(world), tell_contact)
     autopilot = outfit(
         world,
         airframe=settings.airframe,

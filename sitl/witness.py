@@ -1,6 +1,7 @@
 """What a simulated vehicle came near to, and what it touched."""
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal
 
@@ -48,11 +49,13 @@ class Testimony:
 class Witness:
     """Watches a flight among obstacles. `summary` is what it has seen so far.
 
-    `began_ns` is the flight time at which the autopilot was booted; set it where both clocks are known.
+    `tell_contact` hears of the first contact when it happens. `began_ns` is the flight time at which the autopilot was
+    booted; set it where both clocks are known.
     """
 
-    def __init__(self, obstacles: Obstacles) -> None:
+    def __init__(self, obstacles: Obstacles, tell_contact: Callable[[Contact], None] | None = None) -> None:
         self._obstacles = obstacles
+        self._tell_contact = tell_contact
         self.summary = Testimony()
         self.began_ns = 0
         self._looked_from: Vector = (math.inf, math.inf, math.inf)
@@ -69,6 +72,8 @@ class Witness:
         contact = Contact(what, vehicle.position_m, self._t_ns(boot_s))
         seen = self.summary
         self.summary = Testimony(seen.conductor, seen.support, seen.other, contact)
+        if self._tell_contact is not None:
+            self._tell_contact(contact)
         return contact
 
     def _touched(self, boot_s: float, vehicle: Vehicle, before_m_s: Vector) -> TouchedThing | None:

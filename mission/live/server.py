@@ -14,7 +14,7 @@ from multiprocessing.connection import Connection
 from mission.live.board import Board
 from mission.live.settings import Batch, LiveSettings, Serving
 from mission.live.web import LiveServer
-from mission.log.encoding import LiveStream
+from mission.log.live_stream import LiveStream
 from mission.operator import Wish
 
 WORDS = {Wish.HOLD: b"h", Wish.LAND: b"l"}

@@ -144,6 +144,12 @@ LOCATION_RATE_HZ = 2.0
 FOXGLOVE_CHANNELS = (IMAGE, ANNOTATIONS, CALIBRATION, TRANSFORM, POSE, LOCATION, LOG, SCENE)
 
 
+CAPTURE_TIMED = (VisionEntry, LineFix)
+"""What carries a frame's time of capture, as its camera tells it: where that clock is wrong, it says nothing about how
+long the flight was. All else carries our own clock's time.
+"""
+
+
 class RateLimit:
     """Lets through at most `rate_hz` [1/s, flight] of a stream."""
 

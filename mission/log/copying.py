@@ -8,8 +8,9 @@ from pathlib import Path
 from mcap.records import Attachment, Channel, Header, McapRecord, Message, Metadata, Schema
 from mcap.writer import Writer
 
-from drivers.mcap_stream import open_records
+from drivers.mcap_stream import McapFile
 from mission.log import channels
+from mission.log.damage import METADATA, as_metadata, damage_of
 from mission.log.errors import LogError
 
 _TELL_PERIOD = 1_000  # records
@@ -39,7 +40,7 @@ def write_copy(
 
     Messages go through `change` on their way. `records` are records of mission.log.channels with their log times [ns,
     Unix], in the order of these. `tell` hears how much of `source` has been read, 0 to 1. What stands under `out` is
-    whole: it is written under another name first.
+    whole: it is written under another name first. What is damaged in `source` is not copied, and the copy says so.
     Raises CopyError when it exists or cannot be written, LogError when `source` cannot be read.
     """
     if out.exists():
@@ -63,14 +64,19 @@ def write_copy(
 
 
 def _records(source: Path, tell: Callable[[float], None]) -> Iterator[McapRecord]:
-    """Every record of a log; raises LogError."""
+    """Every record of a log, and at its end what of it is damaged; raises LogError."""
     try:
         with source.open("rb") as file:
             n_bytes = max(source.stat().st_size, 1)
-            for index, record in enumerate(open_records(file)):
+            log = McapFile(file)
+            for index, record in enumerate(log.records()):
                 if index % _TELL_PERIOD == 0:
                     tell(file.tell() / n_bytes)
-                yield record
+                if not (isinstance(record, Metadata) and record.name == METADATA):
+                    yield record
+            damage = damage_of(log)
+            if damage is not None:
+                yield Metadata(METADATA, as_metadata(damage))
     except OSError as error:
         raise LogError(f"The log {source} cannot be read ({error.strerror}); is its disk still there?") from error
 
@@ -78,39 +84,69 @@ def _records(source: Path, tell: Callable[[float], None]) -> Iterator[McapRecord
 def _copy(
     originals: Iterator[McapRecord], writer: Writer, records: Iterator[tuple[int, object]], change: Change
 ) -> None:
-    schema_ids = {0: 0}  # 0: a channel without a schema
-    channel_ids: dict[int, int] = {}
-    topics: dict[int, str] = {}
+    copier = Copier(writer)
     added = _Added(writer)
     waiting = next(records, None)
     for record in originals:
-        # A closed log repeats its schemas and channels at its end.
-        if isinstance(record, Header):
-            writer.start(record.profile, record.library)
-        elif isinstance(record, Schema) and record.id not in schema_ids:
-            schema_ids[record.id] = writer.register_schema(record.name, record.encoding, record.data)
-        elif isinstance(record, Channel) and record.id not in channel_ids:
-            topics[record.id] = record.topic
-            channel_ids[record.id] = writer.register_channel(
-                record.topic, record.message_encoding, schema_ids[record.schema_id], record.metadata
-            )
-        elif isinstance(record, Attachment):
-            writer.add_attachment(record.create_time, record.log_time, record.name, record.media_type, record.data)
-        elif isinstance(record, Metadata):
-            writer.add_metadata(record.name, record.metadata)
-        elif isinstance(record, Message):
-            while waiting is not None and waiting[0] <= record.log_time:
-                added.write(*waiting)
-                waiting = next(records, None)
-            data = change(topics[record.channel_id], record.log_time, record.data)
-            if data is not None:
-                writer.add_message(
-                    channel_ids[record.channel_id], record.log_time, data, record.publish_time, record.sequence
-                )
+        while waiting is not None and isinstance(record, Message) and waiting[0] <= record.log_time:
+            added.write(*waiting)
+            waiting = next(records, None)
+        copier.copy(record, change)
     while waiting is not None:
         added.write(*waiting)
         waiting = next(records, None)
     writer.finish()
+
+
+class Copier:
+    """Copies a log's records, header first, through a writer that is not started yet.
+
+    What a log says once is copied once: a closed log repeats its schemas and channels, and a log may be copied again
+    behind itself.
+    """
+
+    def __init__(self, writer: Writer) -> None:
+        self._writer = writer
+        self._schema_ids = {0: 0}  # 0: a channel without a schema
+        self._channel_ids: dict[int, int] = {}
+        self._topics: dict[int, str] = {}
+        self._said: set[tuple[type, str]] = set()
+
+    def copy(self, record: McapRecord, change: Change = unchanged, later_ns: int = 0) -> None:
+        """Copy a record; a message goes through `change`, and stands `later_ns` later in the new log."""
+        writer = self._writer
+        if isinstance(record, Message):
+            data = change(self._topics[record.channel_id], record.log_time, record.data)
+            if data is not None:
+                writer.add_message(
+                    self._channel_ids[record.channel_id],
+                    record.log_time + later_ns,
+                    data,
+                    record.publish_time + later_ns,
+                    record.sequence,
+                )
+        elif isinstance(record, Schema):
+            if record.id not in self._schema_ids:
+                self._schema_ids[record.id] = writer.register_schema(record.name, record.encoding, record.data)
+        elif isinstance(record, Channel):
+            if record.id not in self._channel_ids:
+                self._topics[record.id] = record.topic
+                self._channel_ids[record.id] = writer.register_channel(
+                    record.topic, record.message_encoding, self._schema_ids[record.schema_id], record.metadata
+                )
+        elif self._is_new(record):
+            if isinstance(record, Header):
+                writer.start(record.profile, record.library)
+            elif isinstance(record, Attachment):
+                writer.add_attachment(record.create_time, record.log_time, record.name, record.media_type, record.data)
+            elif isinstance(record, Metadata):
+                writer.add_metadata(record.name, record.metadata)
+
+    def _is_new(self, record: McapRecord) -> bool:
+        key = type(record), getattr(record, "name", "")
+        is_new = key not in self._said
+        self._said.add(key)
+        return is_new
 
 
 class _Added:

@@ -1,53 +1,27 @@
-"""A flight's records in Foxglove's words: the channels, and the two sinks that they go to, a log and a live stream.
-
-The only file that imports foxglove.
-"""
+"""A flight's records in Foxglove's words and channels, for whichever sink listens: a log or a live stream."""
 
 import functools
 import json
 import math
-import queue
-import time
 from collections.abc import Callable, Iterable
-from typing import Any
+from typing import Any, get_args
 
 import foxglove
 import numpy as np
 from foxglove import channels as fox_channels
 from foxglove import messages as fox
-from foxglove.mcap import MCAPWriteOptions, MCAPWriter
-from foxglove.websocket import ChannelView, Client, ServerListener
 
 from drivers.camera.camera import Intrinsics
 from drivers.clock import NS_PER_S
 from mission.autopilot import GlobalPoint, Setpoint, VehicleState
 from mission.geodesy import point_at
 from mission.log import channels
-from mission.log.disk import LogFile
-from mission.log.records import LoggedMission, LogHealth, SentSetpoint, StatusText, VisionEntry
-from mission.log.wording import line_of
-from mission.records import (
-    Attachment,
-    AutopilotTarget,
-    ClockSync,
-    ControlTick,
-    Event,
-    FlightStart,
-    LineFix,
-    MissionEnded,
-    Origin,
-    PreflightCheck,
-    Severity,
-    TaskEnded,
-    TaskStarted,
-    TrueLine,
-    TruePose,
-)
+from mission.log.records import LoggedMission, VisionEntry
+from mission.log.wording import Worded, line_of
+from mission.records import Origin, PreflightCheck, Severity, TrueLine
 from vision.records import VisionReport
 
-_CHUNK_BYTES = 256 * 1024
 _LASTING = (LoggedMission, Origin, TrueLine, PreflightCheck)  # what who comes later wants to be told, too
-_LIVE_BACKLOG = 256  # messages for each viewer: what a slow one does not take in time is dropped
 
 _MAP_FROM_NED = fox.Quaternion(x=math.sqrt(0.5), y=math.sqrt(0.5), z=0.0, w=0.0)  # ENU, which viewers hold upright
 _FRD_FROM_CAMERA = fox.Quaternion(x=0.0, y=0.0, z=math.sqrt(0.5), w=math.sqrt(0.5))  # looks down, its top forward
@@ -66,7 +40,7 @@ class Encoder:
     """The channels of one flight.
 
     Each record goes to its own JSON channel, and where a viewer can show it, to Foxglove's own. Every sink of `context`
-    hears them. `newest_ns` is the newest time [ns, flight] of any record.
+    hears them. `newest_ns` is the newest time [ns, flight] of any record by our own clock.
     """
 
     def __init__(self, context: foxglove.Context, mission: LoggedMission) -> None:
@@ -104,7 +78,12 @@ class Encoder:
 
     def write(self, record: object) -> None:
         """Write a record to every channel that shows it. Raises KeyError for a type that the table lacks."""
-        _WRITE[type(record)](self, record)
+        _SHOWN.get(type(record), Encoder.write_plain)(self, record)
+
+    @staticmethod
+    def knows(record: object) -> bool:
+        """Whether records of this type can be written."""
+        return type(record) in _SHOWN or type(record) in channels.CHANNEL_OF
 
     def repeat(self, topic: str) -> None:
         """Write again what a topic said once and for all, for a viewer who came later."""
@@ -114,7 +93,8 @@ class Encoder:
     def write_plain(self, record: Any) -> None:
         """Write a record as JSON; a channel with a rate limit skips what comes sooner."""
         t_ns = getattr(record, "t_ns", self._start_ns)
-        self.newest_ns = max(self.newest_ns, t_ns)
+        if not isinstance(record, channels.CAPTURE_TIMED):
+            self.newest_ns = max(self.newest_ns, t_ns)
         limit = self._limits.get(type(record))
         if limit is None or limit.admits(t_ns):
             self._log(self._json[type(record)], channels.encode(record), t_ns, is_lasting=type(record) in _LASTING)
@@ -241,139 +221,16 @@ class Encoder:
         return fox.Timestamp(*divmod(t_ns + self._offset_ns, NS_PER_S))
 
 
-_WRITE: dict[type, Callable[[Encoder, Any], None]] = {
+# How what a viewer can show is written; all else that the log's table names is written as JSON alone.
+_SHOWN: dict[type, Callable[[Encoder, Any], None]] = {
+    **dict.fromkeys(get_args(Worded), Encoder.write_worded),
     LoggedMission: Encoder.write_mission,
     VehicleState: Encoder.write_state,
-    SentSetpoint: Encoder.write_plain,
     VisionReport: Encoder.write_vision,
-    PreflightCheck: Encoder.write_worded,
-    TaskStarted: Encoder.write_worded,
-    TaskEnded: Encoder.write_worded,
-    MissionEnded: Encoder.write_worded,
-    Event: Encoder.write_worded,
-    StatusText: Encoder.write_worded,
-    LineFix: Encoder.write_plain,
-    AutopilotTarget: Encoder.write_plain,
-    ClockSync: Encoder.write_plain,
-    ControlTick: Encoder.write_plain,
-    FlightStart: Encoder.write_plain,
-    LogHealth: Encoder.write_plain,
     Origin: Encoder.write_origin,
     Intrinsics: Encoder.write_camera,
-    TruePose: Encoder.write_plain,
     TrueLine: Encoder.write_line,
 }
-
-
-class McapLog:
-    """An MCAP file as an encoder's sink. `newest_ns` is the newest time [ns, flight] of any record."""
-
-    def __init__(self, file: LogFile, mission: LoggedMission) -> None:
-        context = foxglove.Context()
-        # Without seeking, a chunk is written whole once it is full: a file cut anywhere holds only whole chunks.
-        options = MCAPWriteOptions(
-            profile=channels.PROFILE, chunk_size=_CHUNK_BYTES, disable_seeking=True, compression_threads=0
-        )
-        self._mcap: MCAPWriter = foxglove.open_mcap(file, context=context, writer_options=options)
-        self._encoder = Encoder(context, mission)
-        self._mcap.write_metadata(
-            channels.PROFILE,
-            {
-                **mission.metadata,
-                "mission": mission.name,
-                "mission_sha256": mission.sha256,
-                "unix_minus_flight_ns": str(mission.unix_minus_flight_ns),
-            },
-        )
-
-    @property
-    def newest_ns(self) -> int:
-        """The newest time [ns, flight] of any record."""
-        return self._encoder.newest_ns
-
-    def write(self, record: object) -> None:
-        """Write a record to every channel that shows it, a file as it is. Raises KeyError for any other type."""
-        if isinstance(record, Attachment):
-            self._attach(record)
-        else:
-            self._encoder.write(record)
-
-    def flush(self) -> None:
-        """Hand over to the file what is still in memory."""
-        self._mcap.flush()
-
-    def close(self) -> None:
-        """Finish the file."""
-        self._mcap.close()
-
-    def _attach(self, attachment: Attachment) -> None:
-        now_ns = time.time_ns()
-        self._mcap.attach(
-            log_time=now_ns,
-            create_time=now_ns,
-            name=attachment.name,
-            media_type=attachment.media_type,
-            data=attachment.data,
-        )
-
-
-class LiveStream:
-    """The same channels for viewers: a WebSocket server that Foxglove connects to; it takes nothing from them.
-
-    It serves from threads of its own and drops what a slow viewer does not take. Raises OSError, in words for people,
-    when it cannot be opened. `port` 0 takes any free one.
-    """
-
-    def __init__(self, address: str, port: int) -> None:
-        self._context = foxglove.Context()
-        self._newcomers: queue.SimpleQueue[str] = queue.SimpleQueue()
-        foxglove.set_log_level("CRITICAL")  # a viewer that goes without a word is nobody's business
-        try:
-            self._server = foxglove.start_server(
-                name="lineflight",
-                host=address,
-                port=port,
-                server_listener=_Newcomers(self._newcomers),
-                context=self._context,
-                message_backlog_size=_LIVE_BACKLOG,
-            )
-        except RuntimeError as error:
-            raise OSError(str(error)) from None
-        self._encoder: Encoder | None = None
-
-    @property
-    def port(self) -> int:
-        """The port that it listens on."""
-        return int(self._server.port)
-
-    def write(self, record: object) -> None:
-        """Send a record to whoever watches. What comes before the flight's LoggedMission is not sent, nor are files."""
-        if isinstance(record, LoggedMission):
-            self._encoder = Encoder(self._context, record)
-        if self._encoder is not None and type(record) in _WRITE:
-            self._encoder.write(record)
-
-    def welcome(self) -> None:
-        """Tell those who came since the last call what was said once and for all."""
-        while not self._newcomers.empty():
-            topic = self._newcomers.get()
-            if self._encoder is not None:
-                self._encoder.repeat(topic)
-
-    def close(self) -> None:
-        """Serve no more."""
-        self._server.stop()
-
-
-class _Newcomers(ServerListener):  # type: ignore[misc]  # foxglove is untyped here
-    """Keeps which topics somebody has just begun to listen to."""
-
-    def __init__(self, topics: "queue.SimpleQueue[str]") -> None:
-        self._topics = topics
-
-    def on_subscribe(self, client: Client, channel: ChannelView) -> None:
-        """Somebody begins to listen; called by a thread of the server."""
-        self._topics.put(channel.topic)
 
 
 def _quaternion(roll_rad: float, pitch_rad: float, yaw_rad: float) -> fox.Quaternion:

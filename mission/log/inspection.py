@@ -4,13 +4,16 @@ from dataclasses import replace
 
 from drivers.clock import NS_PER_S
 from mission.log.blame.blame import DEFAULT_LIMITS, find_excursions
-from mission.log.blame.records import Limits
+from mission.log.blame.records import Excursion, Kind, Limits
 from mission.log.reader import Flight
 from mission.log.summary import ExcursionSummary, FlightReport, flight_start_ns, summarise
 
 
 def inspect_flight(flight: Flight, limits: Limits = DEFAULT_LIMITS) -> FlightReport:
-    """Work out a flight's report, its excursions beyond `limits` with it."""
+    """Work out a flight's report, its excursions beyond `limits` with it.
+
+    Where the log is damaged, nobody is blamed for what was not seen there: `FlightReport.damage` tells of it.
+    """
     start_ns = flight_start_ns(flight)
     return replace(
         summarise(flight),
@@ -28,5 +31,17 @@ def inspect_flight(flight: Flight, limits: Limits = DEFAULT_LIMITS) -> FlightRep
                 excursion.evidence,
             )
             for excursion in find_excursions(flight, limits)
+            if not _is_for_want_of_records(excursion, flight)
         ),
+    )
+
+
+def _is_for_want_of_records(excursion: Excursion, flight: Flight) -> bool:
+    """Whether nothing was seen because the log has a hole there."""
+    if excursion.kind is not Kind.UNSEEN or flight.damage is None:
+        return False
+    offset_ns = flight.mission.unix_minus_flight_ns
+    return any(
+        begin_ns - offset_ns <= excursion.end_ns and excursion.start_ns <= end_ns - offset_ns
+        for begin_ns, end_ns in flight.damage.holes_ns
     )

@@ -1,4 +1,4 @@
-"""Read a flight back from its log, also from one that was cut off when the power went."""
+"""Read a flight back from its log, also from one that was cut off when the power went, or damaged since."""
 
 import json
 from collections import defaultdict
@@ -6,15 +6,16 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import Any
 
 import numpy as np
 from pydantic import ValidationError
 
 from drivers.camera.camera import Intrinsics
-from drivers.mcap_stream import IMAGE_DATA_FIELD, IMAGE_TOPIC, MAGIC, bytes_field, open_messages, whole_records
+from drivers.mcap_stream import IMAGE_DATA_FIELD, IMAGE_TOPIC, Damage, McapFile, bytes_field, open_messages
 from mission.autopilot import VehicleState
 from mission.log import channels
+from mission.log.damage import damage_of
 from mission.log.errors import LogError
 from mission.log.imported import (
     Imported,
@@ -46,6 +47,7 @@ from mission.replay.records import ReplayedEstimate, ReplayedSetpoint
 from vision.records import VisionReport
 
 _IMPORTED = (ImportedState, ImportedSetpoint, ImportedActuators, ImportedPower, ImportedText, ImportedMode)
+_NOT_FLOWN = (*_IMPORTED, *channels.CAPTURE_TIMED)  # whose times do not tell when the flight ended
 
 
 @dataclass(frozen=True, slots=True)
@@ -55,7 +57,8 @@ class Flight:
     `is_truncated` says that the log was never closed: the program or the computer died. `reports` carry their JPEGs
     only when the flight was read with images; `image_times_ns` tells of which frames the log has one. `imported` is the
     autopilot's own log, where `lineflight import` has laid it beside ours; `end_ns` does not count it. A reference log
-    also holds what a replay made of it (mission/replay).
+    also holds what a replay made of it (mission/replay). `damage` tells what of the log could
+    not be read.
     """
 
     path: Path
@@ -85,6 +88,7 @@ class Flight:
     reference_setpoints: tuple[ReplayedSetpoint, ...]
     end_ns: int
     is_truncated: bool
+    damage: Damage | None = None
 
     @property
     def camera(self) -> Intrinsics | None:
@@ -102,19 +106,21 @@ class Flight:
 def read_flight(path: Path, *, with_images: bool = False) -> Flight:
     """Read a flight's log; `with_images` keeps the frames too, which may need much memory.
 
-    Raises LogError when `path` is not the log of a flight, or is damaged.
+    Damaged parts are passed over. Raises LogError when `path` is not the log of a flight, or nothing of it can be read.
     """
     streams: dict[type, list[Any]] = defaultdict(list)
     jpegs: dict[int, bytes] = {}
-    attachments: dict[str, bytes] = {}
-    with _opened(path) as file:
-        _, is_closed = whole_records(file)
-        for topic, log_time_ns, content in _contents(path, file, attachments):
+    offset_ns = 0
+    with _opened(path) as log:
+        for topic, log_time_ns, content in _contents(path, log):
             if topic in channels.CHANNEL_AT:
                 streams[type(content)].append(content)
+                offset_ns = log_time_ns - getattr(content, "t_ns", log_time_ns - offset_ns)
             elif with_images:
                 jpegs[log_time_ns] = content
-    return _flight(path, streams, jpegs, attachments, is_truncated=not is_closed)
+        if not streams[LoggedMission]:
+            streams[LoggedMission].append(_lost_mission(path, log, streams, offset_ns))
+        return _flight(path, streams, jpegs, log)
 
 
 def stream_log(path: Path) -> Iterator[tuple[str, int, Any]]:
@@ -123,36 +129,45 @@ def stream_log(path: Path) -> Iterator[tuple[str, int, Any]]:
     The content is a record where the topic is one of RECORD_CHANNELS, and a frame's JPEG where it is IMAGE_TOPIC;
     there are no others. Raises LogError as `read_flight` does.
     """
-    with _opened(path) as file:
-        yield from _contents(path, file, {})
+    with _opened(path) as log:
+        yield from _contents(path, log)
+
+
+def find_damage(path: Path) -> Damage | None:
+    """Read a whole log only to see what of it is damaged. Raises LogError where it cannot be read at all."""
+    with _opened(path) as log:
+        for _ in log.messages():
+            pass
+        return damage_of(log)
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator[BinaryIO]:
+def _opened(path: Path) -> Iterator[McapFile]:
     """The file of a log. Raises LogError where it is none, or cannot be read any more."""
     try:
         if path.is_dir():
             raise LogError(f"{path} is a folder; name one of the .mcap files in it.")
         with path.open("rb") as file:
-            magic = file.read(len(MAGIC))
-            if not magic:
+            if not file.read(1):
                 raise LogError(f"The log {path} is empty; the flight ended before anything was written to it.")
-            if magic != MAGIC:
-                raise LogError(f"{path} is not an MCAP file; name a log that lineflight wrote (.mcap).")
-            yield file
+            try:
+                log = McapFile(file)
+            except ValueError:
+                raise LogError(f"{path} is not an MCAP file; name a log that lineflight wrote (.mcap).") from None
+            yield log
     except OSError as error:
         raise LogError(f"The log {path} cannot be read ({error.strerror}); check its name and its rights.") from error
 
 
-def _contents(path: Path, file: BinaryIO, attachments: dict[str, bytes]) -> Iterator[tuple[str, int, Any]]:
-    """What `stream_log` yields, of an open log; fills `attachments` by name."""
-    has_mission = False
-    file.seek(0)
+def _contents(path: Path, log: McapFile) -> Iterator[tuple[str, int, Any]]:
+    """What `stream_log` yields, of an open log."""
+    has_mission = has_records = False
     try:
-        for topic, log_time_ns, body in open_messages(file, attachments):
+        for topic, log_time_ns, body in log.messages():
             if topic in channels.CHANNEL_AT:
                 record = channels.decode(topic, body)
                 has_mission = has_mission or isinstance(record, LoggedMission)
+                has_records = has_records or hasattr(record, "t_ns")
                 yield topic, log_time_ns, record
             elif topic == IMAGE_TOPIC:
                 yield topic, log_time_ns, bytes_field(body, IMAGE_DATA_FIELD)
@@ -164,10 +179,28 @@ def _contents(path: Path, file: BinaryIO, attachments: dict[str, bytes]) -> Iter
             f"The log {path} was written by another version of lineflight ({first['type']} at "
             f"{'.'.join(map(str, first['loc']))}); read it with that one."
         ) from error
-    except Exception as error:  # the decompressor, the decoder and the parser each have their own
-        raise LogError(f"The log {path} is damaged ({type(error).__name__}: {error}); recover it with mcap.") from error
-    if not has_mission:
+    except Exception as error:  # the library and the parser each have their own
+        raise LogError(f"The log {path} is damaged, and cannot be read; take a copy of it, if there is one.") from error
+    if has_mission:
+        return
+    if damage_of(log) is None:
         raise LogError(f"{path} holds no mission; it is not the log of a flight, or was cut off at its very start.")
+    if not has_records:
+        raise LogError(f"The log {path} is damaged, and nothing of a flight is left in it; is there a copy of it?")
+
+
+def _lost_mission(path: Path, log: McapFile, streams: dict[type, list[Any]], offset_ns: int) -> LoggedMission:
+    """What was flown, where the log's record of it is damaged: from what the log says of it besides."""
+    metadata = dict(log.metadata.get(channels.PROFILE, {}))
+    metadata.pop("unix_minus_flight_ns", None)
+    return LoggedMission(
+        name=metadata.pop("mission", path.stem),
+        text=log.attachments.get("mission.yaml", b"").decode(),
+        sha256=metadata.pop("mission_sha256", ""),
+        start_ns=min(record.t_ns for records in streams.values() for record in records if hasattr(record, "t_ns")),
+        unix_minus_flight_ns=offset_ns,
+        metadata=metadata,
+    )
 
 
 def read_images(flight: Flight) -> Iterator[tuple[int, bytes]]:
@@ -185,14 +218,7 @@ def read_images(flight: Flight) -> Iterator[tuple[int, bytes]]:
         raise LogError(f"The log {flight.path} cannot be read ({error.strerror}); is its disk still there?") from error
 
 
-def _flight(
-    path: Path,
-    streams: dict[type, list[Any]],
-    jpegs: dict[int, bytes],
-    attachments: dict[str, bytes],
-    *,
-    is_truncated: bool,
-) -> Flight:
+def _flight(path: Path, streams: dict[type, list[Any]], jpegs: dict[int, bytes], log: McapFile) -> Flight:
     for records in streams.values():
         records.sort(key=lambda record: getattr(record, "t_ns", 0))
     mission: LoggedMission = streams[LoggedMission][0]
@@ -201,7 +227,7 @@ def _flight(
     times_ns = [
         records[-1].t_ns
         for kind, records in streams.items()
-        if records and hasattr(records[-1], "t_ns") and kind not in _IMPORTED
+        if records and hasattr(records[-1], "t_ns") and kind not in _NOT_FLOWN
     ]
     ended, lines, origins = streams[MissionEnded], streams[TrueLine], streams[Origin]
     return Flight(
@@ -225,13 +251,14 @@ def _flight(
         ticks=tuple(streams[ControlTick]),
         syncs=tuple(streams[ClockSync]),
         health=tuple(streams[LogHealth]),
-        attachments=attachments,
+        attachments=log.attachments,
         image_times_ns=frozenset(entry.t_ns for entry in streams[VisionEntry] if entry.has_image),
         imported=imported,
         reference_estimates=tuple(streams[ReplayedEstimate]),
         reference_setpoints=tuple(streams[ReplayedSetpoint]),
         end_ns=max([mission.start_ns, *times_ns]),
-        is_truncated=is_truncated or (imported is not None and imported.log.was_cut_off),
+        is_truncated=not log.is_closed or (imported is not None and imported.log.was_cut_off),
+        damage=damage_of(log),
     )
 
 

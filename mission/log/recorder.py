@@ -11,7 +11,7 @@ from drivers.clock import Clock, ScaledClock
 from mission.autopilot import Setpoint
 from mission.log.backlog import Backlog
 from mission.log.disk import LogFile
-from mission.log.encoding import McapLog
+from mission.log.mcap_log import McapLog
 from mission.log.records import LoggedMission, LogHealth, SentSetpoint, StatusText
 
 _MAX_RECORDS = 20_000  # a minute or more of all streams
@@ -108,6 +108,8 @@ class Recorder:
                     self._write(log, self._health(log.newest_ns, self._file))
                     log.flush()
                     next_flush_s = time.monotonic() + _FLUSH_PERIOD_S
+            log.flush()
+            self._write(log, self._health(log.newest_ns, self._file))  # once more, of the whole log
             log.close()
         except Exception as error:
             self._fault = f"The log {self.path} was given up: {type(error).__name__}: {error}."

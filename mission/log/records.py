@@ -42,7 +42,7 @@ class StatusText:
 
 @dataclass(frozen=True, slots=True)
 class LogHealth:
-    """How the log itself does, told once a second by its writer.
+    """How the log itself does, told once a second by its writer, and a last time when all has been written.
 
     `n_bytes` are on the disk; `n_waiting` records wait for it. `n_dropped_images` and `n_dropped_records` were given up
     so far, because it was too slow. `work_s` is the processor time that writing has taken so far.

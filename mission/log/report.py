@@ -28,6 +28,8 @@ def print_report(report: FlightReport, console: Console) -> None:
             console.print(Text.assemble(("pre-flight  ", "dim"), (line, style)), width=width)
     if report.is_truncated:
         console.print(Text("The log was cut off; this is what it still holds.", style="yellow"), width=width)
+    if report.damage is not None:
+        console.print(Text(report.damage, style="yellow"), width=width)
     is_troubled = any(event.severity != Severity.INFO for event in report.events)
     if report.excursions:
         _print_excursions(report.excursions, console, width)

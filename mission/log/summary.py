@@ -2,11 +2,13 @@
 
 from collections import Counter
 from dataclasses import asdict, dataclass
+from itertools import zip_longest
 from typing import Any
 
 import numpy as np
 
 from drivers.clock import NS_PER_S
+from mission.log.damage import words_of_damage
 from mission.log.measures import Floats, line_fit_distances_m, nearest_on_axis, offboard_gaps_s
 from mission.log.reader import Flight
 from mission.log.wording import words_of
@@ -147,7 +149,7 @@ class FlightReport:
     """A flight in figures. Times [s] are since the flight's start (`flight_start_ns`).
 
     `lateral` and `yaw_error` need ground truth, which only a simulated flight has. `excursions` are empty where nobody
-    looked for them (mission/log/inspection.py does).
+    looked for them (mission/log/inspection.py does). `damage` says in a sentence what of the log could not be read.
     """
 
     mission: str
@@ -165,6 +167,7 @@ class FlightReport:
     landing: LandingSummary | None
     events: tuple[EventSummary, ...]
     excursions: tuple[ExcursionSummary, ...] = ()
+    damage: str | None = None
 
 
 def summarise(flight: Flight) -> FlightReport:
@@ -209,6 +212,7 @@ def summarise(flight: Flight) -> FlightReport:
             EventSummary(since_start_s(event.t_ns), event.name, str(event.severity), event.message, event.reaction)
             for event in flight.events
         ),
+        damage=None if flight.damage is None else words_of_damage(flight.damage),
     )
 
 
@@ -223,12 +227,18 @@ def to_json(report: FlightReport) -> dict[str, Any]:
 
 
 def task_spans(flight: Flight) -> tuple[TaskSpan, ...]:
-    """Pair each task's start with its end, in the order flown."""
+    """Pair each task's start with its end, in the order flown.
+
+    One whose end the log lacks ended by when the next one began, if one did: that part of the log is damaged.
+    """
     unpaired: list[TaskEnded] = list(flight.tasks_ended)
     spans = []
-    for started in flight.tasks_started:
+    for started, following in zip_longest(flight.tasks_started, flight.tasks_started[1:]):
         ended = next((end for end in unpaired if end.index == started.index and end.t_ns >= started.t_ns), None)
-        if ended is None:
+        if ended is None and following is not None:
+            why = "Its end stood in a part of the log that is damaged."
+            spans.append(TaskSpan(started.task, started.t_ns, following.t_ns, UNFINISHED, why))
+        elif ended is None:
             spans.append(TaskSpan(started.task, started.t_ns, None, UNFINISHED, "The log breaks off before its end."))
         else:
             unpaired.remove(ended)

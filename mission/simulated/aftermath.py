@@ -1,9 +1,10 @@
-"""What is known of a simulated flight when it is over, beyond its log."""
+"""What is known of a simulated flight beyond what its autopilot knows: what it touched, and what it came near to."""
 
 from dataclasses import dataclass
 from typing import Any
 
-from sitl.witness import Nearness, Testimony
+from mission.records import Event, Severity
+from sitl.witness import Contact, Nearness, Testimony
 from sitl.world.records import World
 
 
@@ -19,13 +20,7 @@ class Aftermath:
     def contact(self) -> str | None:
         """What the vehicle touched, in a sentence; None where it touched nothing."""
         contact = None if self.testimony is None else self.testimony.contact
-        if contact is None:
-            return None
-        north_m, east_m, down_m = contact.position_ned_m
-        return (
-            f"The vehicle touched {_A[contact.what]} {north_m:.1f} m north and {east_m:.1f} m east of its start, "
-            f"{-down_m:.1f} m up, and fell."
-        )
+        return None if contact is None else _sentence(contact)
 
     @property
     def clearances(self) -> str | None:
@@ -60,6 +55,19 @@ _A = {
     "building": "a house",
     "ground": "the ground",
 }
+
+
+def contact_event(contact: Contact) -> Event:
+    """A contact as the log keeps it, at its moment."""
+    return Event(contact.t_ns, "contact", Severity.ERROR, _sentence(contact))
+
+
+def _sentence(contact: Contact) -> str:
+    north_m, east_m, down_m = contact.position_ned_m
+    return (
+        f"The vehicle touched {_A[contact.what]} {north_m:.1f} m north and {east_m:.1f} m east of its start, "
+        f"{-down_m:.1f} m up, and fell."
+    )
 
 
 def _m(nearness: Nearness | None) -> float | None:

@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 from drivers.camera.camera import Camera, Intrinsics
 from drivers.clock import ScaledClock
 from mission.autopilot import VehicleState
-from mission.records import TrueLine, TruePose
-from mission.simulated.aftermath import Aftermath
+from mission.records import Event, TrueLine, TruePose
+from mission.simulated.aftermath import Aftermath, contact_event
 from mission.simulated.scenario import Scenario
 from sitl.camera import SimCamera
 from sitl.control import quaternion_of
@@ -30,6 +30,7 @@ from sitl.pose import Pose, PoseBlock
 from sitl.render.map import render_map
 from sitl.server import AutopilotName, SitlSettings, SitlSummary, run
 from sitl.setup import SETUP
+from sitl.witness import Contact
 from sitl.world.file import DEFAULT_WORLD, WorldError, load_world
 from sitl.world.records import World
 
@@ -60,10 +61,10 @@ class Simulation:
         self._port = free_udp_port()
         self._poses = PoseBlock.create()
         self._stop = multiprocessing.get_context("spawn").Event()
-        self._summaries, self._child_summaries = multiprocessing.get_context("spawn").Pipe(duplex=False)
+        self._news, self._child_news = multiprocessing.get_context("spawn").Pipe(duplex=False)
         settings = sitl_settings(self.world, scenario, clock, self._port, self._poses.name)
         self._process = multiprocessing.get_context("spawn").Process(
-            target=_serve, args=(settings, self._stop, self._child_summaries), name="lineflight-sitl", daemon=True
+            target=_serve, args=(settings, self._stop, self._child_news), name="lineflight-sitl", daemon=True
         )
         self.summary: SitlSummary | None = None
 
@@ -76,10 +77,16 @@ class Simulation:
         """What opens the simulated camera in the vision worker."""
         return sim_camera_opener(self._scenario, self._poses.name, self._clock, camera, rate_hz)
 
-    def true_pose(self) -> TruePose | None:
-        """Where the vehicle truly is; None before the first step."""
+    def truth(self) -> list[TruePose | Event]:
+        """Where the vehicle truly is (nothing before its first step), and what it has touched since the last call."""
         pose = self._poses.read()
-        return None if pose is None else TruePose(pose.t_ns, pose.north_m, pose.east_m, pose.down_m, pose.yaw_rad)
+        truth: list[TruePose | Event] = []
+        if pose is not None:
+            truth.append(TruePose(pose.t_ns, pose.north_m, pose.east_m, pose.down_m, pose.yaw_rad))
+        with contextlib.suppress(EOFError):  # it has died
+            while self._news.poll():
+                self._hear(truth)
+        return truth
 
     @property
     def aftermath(self) -> Aftermath:
@@ -91,7 +98,7 @@ class Simulation:
 
     def __enter__(self) -> Self:
         self._process.start()
-        self._child_summaries.close()
+        self._child_news.close()
         return self
 
     def __exit__(
@@ -99,14 +106,22 @@ class Simulation:
     ) -> None:
         self._stop.set()
         with contextlib.suppress(EOFError):  # it died without a word: then there is no summary
-            if self._summaries.poll(_STOP_TIMEOUT_S):
-                self.summary = self._summaries.recv()
+            while self.summary is None and self._news.poll(_STOP_TIMEOUT_S):
+                self._hear([])
         self._process.join(_STOP_TIMEOUT_S)
         if self._process.is_alive():
             self._process.kill()
             self._process.join()
-        self._summaries.close()
+        self._news.close()
         self._poses.close()
+
+    def _hear(self, truth: list[TruePose | Event]) -> None:
+        """Take one message of the vehicle's process. Raises EOFError when it has died."""
+        message: Contact | SitlSummary = self._news.recv()
+        if isinstance(message, SitlSummary):
+            self.summary = message
+        else:
+            truth.append(contact_event(message))
 
 
 class TelemetryCamera:
@@ -200,12 +215,12 @@ def serve_until_stopped(scenario: Scenario, speed: float, port: int, autopilot: 
     return run(replace(settings, autopilot=autopilot), stop.is_set)
 
 
-def _serve(settings: SitlSettings, stop: ProcessEvent, summaries: Connection) -> None:
+def _serve(settings: SitlSettings, stop: ProcessEvent, news: Connection) -> None:
     # Ctrl-C reaches every process of the terminal: the vehicle must go on flying until the mission has landed it.
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
     parent = os.getppid()
-    summaries.send(run(settings, lambda: stop.is_set() or os.getppid() != parent))
+    news.send(run(settings, lambda: stop.is_set() or os.getppid() != parent, news.send))
 
 
 def world_path_or_name(text: str | None) -> str | None:

@@ -23,9 +23,9 @@ from mission.log.disk import log_path
 from mission.log.recorder import Recorder
 from mission.logbook import FlightPapers, Logbook
 from mission.plan_file import MissionFile
-from mission.records import Event, Severity, TruePose
+from mission.records import TruePose
 from mission.reporting import Progress
-from mission.simulated.aftermath import Aftermath
+from mission.simulated.aftermath import Aftermath, contact_event
 from mission.simulated.in_process import InProcessAutopilot
 from mission.simulated.rendered_eyes import RenderedEyes
 from mission.simulated.scenario import Scenario
@@ -33,10 +33,12 @@ from mission.simulated.simulation import true_line
 from mission.simulated.virtual_time import VirtualClock, run_virtually
 from mission.surroundings import free_bytes
 from sitl.autopilot import SimAutopilot
+from sitl.contact import Obstacles
 from sitl.outfit import outfit
 from sitl.render.photographer import Photographer
 from sitl.render.renderer import Renderer
 from sitl.vehicle import euler_of
+from sitl.witness import Contact, Witness
 from sitl.world.file import load_world
 
 _PROGRESS_PERIOD_S = 1.0
@@ -55,6 +57,8 @@ def fly_virtually(
     Raises WorldError, AirframeError, and LogError when the log cannot be made.
     """
     world = load_world(scenario.world, scenario.light)
+    contacts: list[Contact] = []
+    witness = Witness(Obstacles(world), contacts.append)
     plan, camera = mission.plan, mission.camera
     cv2.setNumThreads(1)  # the camera's and the vision's thread are two already
     sim = outfit(
@@ -64,6 +68,7 @@ def fly_virtually(
         wind_from_rad=scenario.wind_from_rad,
         seed=scenario.seed,
         gust_fronts=scenario.has_gust_fronts,
+        witness=witness,
     )
     photographer = Photographer(Renderer(world, camera, seed=scenario.seed))
     path = log_path(log_folder, plan.name, datetime.now(UTC))
@@ -92,7 +97,7 @@ def fly_virtually(
         with recorder, eyes:
             for item in (camera, *flight_attachments(mission, plan), true_line(world)):
                 recorder.record(item)
-            autopilot.after_step.append(_truth_recorder(sim, recorder))
+            autopilot.after_step.append(_truth_recorder(sim, contacts, recorder))
             papers = FlightPapers(plan.name, str(mission.path), mission.sha256, "in-process", "dry-run", str(path))
             crew = Crew(
                 autopilot,
@@ -114,22 +119,21 @@ def fly_virtually(
                     await asyncio.gather(showing, return_exceptions=True)
                     await autopilot.close()
                 wall_s = time.monotonic() - began_s
-            touched = Aftermath(world, None, None if sim.witness is None else sim.witness.summary).contact
-            if touched is not None:
-                recorder.record(Event(clock.now_ns(), "contact", Severity.ERROR, touched))
             on_progress(executive.progress)
         return FlightOutcome(ended, executive.may_have_armed, path, recorder.failure), sim.boot_s / wall_s
 
     outcome, speed = run_virtually(flight())
-    return outcome, Aftermath(world, speed, None if sim.witness is None else sim.witness.summary)
+    return outcome, Aftermath(world, speed, witness.summary)
 
 
-def _truth_recorder(sim: SimAutopilot, recorder: Recorder) -> Callable[[], None]:
-    """What records the true pose twenty times a second."""
+def _truth_recorder(sim: SimAutopilot, contacts: list[Contact], recorder: Recorder) -> Callable[[], None]:
+    """What records the true pose twenty times a second, and `contacts` as they come."""
     next_ns = 0
 
     def record() -> None:
         nonlocal next_ns
+        while contacts:
+            recorder.record(contact_event(contacts.pop(0)))
         now_ns = round(sim.boot_s * NS_PER_S)
         if now_ns >= next_ns:
             next_ns += _TRUTH_PERIOD_NS

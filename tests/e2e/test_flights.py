@@ -13,6 +13,7 @@ from drivers.camera.camera import Intrinsics
 from mission.log.reader import read_flight
 from mission.simulated.simulation import free_udp_port
 from tests.replay.own_estimates import distance_m, replay_own_estimates
+from tests.support.careless import check_contact_in_log, write_careless_mission
 from tests.support.command_line import ROOT, lineflight, lineflight_stopped
 
 pytestmark = pytest.mark.real_time
@@ -126,3 +127,11 @@ def test_a_lens_that_bends_the_line_is_corrected_in_flight(tmp_path: Path) -> No
     assert ran.json["lateral"]["mean_m"] < 0.5
     assert ran.json["yaw_error"]["median_deg"] < 3.0
     assert ran.json["events"] == []
+
+
+def test_what_the_vehicle_of_the_other_process_touches_is_in_the_log(tmp_path: Path) -> None:
+    mission = write_careless_mission(tmp_path)
+    ran = lineflight("dry-run", mission, "--speed", "2", "--seed", "1", "--log", tmp_path, "--json")
+    assert ran.code == 4, ran.err
+    assert "Traceback" not in ran.err
+    check_contact_in_log(Path(ran.json["log"]), ran.json["contact"])

@@ -11,6 +11,7 @@ from mission.records import Result
 from mission.simulated.aftermath import Aftermath
 from mission.simulated.scenario import Scenario
 from mission.simulated.virtual_flight import fly_virtually
+from tests.support.careless import check_contact_in_log, write_careless_mission
 from tests.support.command_line import lineflight
 
 SHORT_MISSION = """\
@@ -54,15 +55,14 @@ def test_the_same_scenario_is_the_same_flight_to_the_bit(tmp_path: Path) -> None
 
 
 def test_a_vehicle_that_lands_through_the_line_touches_it_and_says_so(tmp_path: Path) -> None:
-    mission = tmp_path / "short.yaml"
-    careless = SHORT_MISSION.replace("return", "land").replace("safety: {line_height_m: 10.3}\n", "")
-    mission.write_text(careless)  # without the line's height nobody knows that it lands there
+    mission = write_careless_mission(tmp_path)
     ran = lineflight("dry-run", mission, "--virtual-time", "--seed", "1", "--log", tmp_path, "--json")
     assert ran.code == 4, ran.err
     assert "touched a conductor" in ran.err
     assert "touched a conductor" in ran.json["contact"]
     assert ran.json["clearance_m"]["conductor"] < 0.5
     assert "Traceback" not in ran.err
+    check_contact_in_log(Path(ran.json["log"]), ran.json["contact"])
 
 
 @pytest.mark.parametrize(

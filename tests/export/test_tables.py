@@ -16,6 +16,7 @@ from mission.export.errors import ExportError, OutputError
 from mission.export.parquet import ParquetTable
 from mission.export.tables import CsvTable, export_tables
 from mission.log.channels import CHANNEL_AT, RECORD_CHANNELS
+from mission.log.copying import write_copy
 from mission.log.errors import LogError
 from mission.log.reader import Flight, stream_log
 from mission.log.records import VisionEntry
@@ -110,17 +111,19 @@ def test_a_log_that_was_cut_off_gives_what_it_holds(flight: Flight, tmp_path: Pa
 
 
 def test_nothing_is_left_of_an_export_that_failed(flight: Flight, tmp_path: Path, folder: Path) -> None:
-    damaged = tmp_path / "damaged.mcap"
-    content = bytearray(flight.path.read_bytes())
-    middle = len(content) // 2
-    content[middle : middle + 64] = bytes(64)
-    damaged.write_bytes(content)
-    with pytest.raises(LogError):
-        export_tables(damaged, folder, ".csv", CsvTable)
+    odd = tmp_path / "odd.mcap"
+    middle_ns = flight.states[len(flight.states) // 2].t_ns + flight.mission.unix_minus_flight_ns
+
+    def change(topic: str, log_time_ns: int, message: bytes) -> bytes:
+        return b"{}" if topic == "/vehicle/state" and log_time_ns > middle_ns else message
+
+    write_copy(flight.path, odd, [], lambda _: None, change)
+    with pytest.raises(LogError, match="another version"):
+        export_tables(odd, folder, ".csv", CsvTable)
     assert not folder.exists()
     folder.mkdir()
     with pytest.raises(LogError):
-        export_tables(damaged, folder, ".parquet", ParquetTable)
+        export_tables(odd, folder, ".parquet", ParquetTable)
     assert list(folder.iterdir()) == []
 
 

@@ -7,7 +7,7 @@ import random
 import subprocess
 import sys
 import time
-from dataclasses import fields
+from dataclasses import fields, replace
 from datetime import UTC, datetime, timedelta, timezone
 from pathlib import Path
 
@@ -16,11 +16,14 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from mcap.reader import make_reader
+from mcap.writer import Writer
 
 from drivers.clock import NS_PER_S
+from drivers.mcap_stream import McapFile
 from mission.autopilot import Setpoint, VehicleState
 from mission.log import channels
 from mission.log.backlog import Backlog
+from mission.log.copying import Copier
 from mission.log.disk import log_path
 from mission.log.errors import LogError
 from mission.log.imported import (
@@ -379,9 +382,45 @@ def test_a_missing_log_and_a_folder_are_refused_in_a_sentence(tmp_path: Path) ->
         read_flight(tmp_path)
 
 
-def test_a_damaged_log_is_refused(log: Path, tmp_path: Path) -> None:
-    data = bytearray(log.read_bytes())
-    data[len(data) // 2] ^= 0xFF
-    (tmp_path / "a.mcap").write_bytes(data)
-    with pytest.raises(LogError, match="is damaged"):
-        read_flight(tmp_path / "a.mcap")
+def test_the_log_tells_at_its_end_how_it_did_as_a_whole(
+    flown: list[tuple[int, object]], log: Path, tmp_path: Path
+) -> None:
+    last = read_flight(log).health[-1]
+    assert (last.n_waiting, last.n_dropped_images, last.n_dropped_records) == (0, 0, 0)
+    assert 0.95 * log.stat().st_size < last.n_bytes < log.stat().st_size
+    assert last.t_ns == max(state.t_ns for state in of_type(flown, VehicleState))  # type: ignore[attr-defined]
+
+
+def test_a_frame_from_the_far_future_makes_no_flight_longer(flown: list[tuple[int, object]], tmp_path: Path) -> None:
+    (report,) = [item for _, item in flown if isinstance(item, VisionReport)][:1]
+    late = replace(report, t_capture_ns=START_NS + 10**6 * NS_PER_S)
+    path = tmp_path / "a.mcap"
+    write_log(path, [*flown[:500], (0, late)])
+    flight = read_flight(path)
+    assert flight.reports[-1].t_capture_ns == late.t_capture_ns
+    assert flight.end_ns < START_NS + 100 * NS_PER_S
+    assert flight.health[-1].t_ns < START_NS + 100 * NS_PER_S
+
+
+def test_a_log_copied_behind_itself_says_once_what_it_says_once(log: Path, tmp_path: Path) -> None:
+    whole, path = read_flight(log), tmp_path / "twice.mcap"
+    later_ns = 1000 * NS_PER_S
+    with path.open("wb") as file:
+        writer = Writer(file)
+        copier = Copier(writer)
+        for k in range(2):
+            with log.open("rb") as source:
+                for record in McapFile(source).records():
+                    copier.copy(record, later_ns=k * later_ns)
+        writer.finish()
+    twice = read_flight(path)
+    assert twice.damage is None
+    assert len(twice.states) == 2 * len(whole.states)
+    assert twice.attachments == whole.attachments
+    with path.open("rb") as file:
+        summary = make_reader(file, validate_crcs=True).get_summary()
+    assert summary is not None
+    assert summary.statistics is not None
+    assert (summary.statistics.attachment_count, summary.statistics.metadata_count) == (1, 1)
+    first_ns, last_ns = summary.statistics.message_start_time, summary.statistics.message_end_time
+    assert last_ns - first_ns == later_ns + whole.end_ns - START_NS

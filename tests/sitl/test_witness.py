@@ -13,7 +13,7 @@ from sitl.modes import Mode
 from sitl.outfit import ground_of, open_field, outfit
 from sitl.place import Origin
 from sitl.vehicle import Vehicle
-from sitl.witness import Witness
+from sitl.witness import Contact, Witness
 from sitl.world.height_grid import HeightGrid
 from sitl.world.records import Conductor, PowerLine, Tree, World
 
@@ -116,6 +116,21 @@ def test_meeting_the_ground_hard_is_a_crash_and_a_landing_is_none(speed_m_s: flo
         vehicle.step(STEP_S, vehicle.airframe.hover_thrust, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
         contacts.append(witness.look(n * STEP_S, vehicle))
     assert [contact.what for contact in contacts if contact is not None] == ([what] if what else [])
+
+
+def test_a_contact_is_told_once_when_it_happens() -> None:
+    told: list[Contact] = []
+    vehicle, witness = Vehicle(), Witness(Obstacles(WORLD), told.append)
+    witness.began_ns = 5_000_000_000
+    vehicle.position_m = (20.0, 0.0, -12.0)
+    witness.look(1.0, vehicle)
+    assert not told
+    vehicle.position_m = (20.0, 0.0, -8.1)
+    contact = witness.look(2.0, vehicle)
+    vehicle.position_m = (20.0, 0.0, -7.9)
+    witness.look(3.0, vehicle)
+    assert told == [contact]
+    assert told[0].t_ns == 7_000_000_000
 
 
 def test_times_are_the_flights() -> None:

@@ -58,6 +58,8 @@
     $("result").textContent = words(report.result);
     $("result").classList.add(tone);
     $("reason").textContent = report.reason;
+    $("damage").textContent = report.damage ?? "";
+    $("damage").hidden = !report.damage;
     $("begun").textContent = `${flight.begun} · ${clock(report.duration_s)} · ${report.tasks.length} tasks`;
     $("log").textContent = flight.log;
     $("mission").textContent = flight.mission_text;
