@@ -220,7 +220,12 @@ def _serve(settings: SitlSettings, stop: ProcessEvent, news: Connection) -> None
     for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP):
         signal.signal(number, signal.SIG_IGN)
     parent = os.getppid()
-    news.send(run(settings, lambda: stop.is_set() or os.getppid() != parent, news.send))
+
+    def tell(message: Contact | SitlSummary) -> None:
+        with contextlib.suppress(BrokenPipeError):  # the mission has died, and nobody listens
+            news.send(message)
+
+    tell(run(settings, lambda: stop.is_set() or os.getppid() != parent, tell))
 
 
 def world_path_or_name(text: str | None) -> str | None:
