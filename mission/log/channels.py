@@ -19,6 +19,7 @@ from mission.log.imported import (
     ImportedText,
 )
 from mission.log.records import LoggedMission, LogHealth, SentSetpoint, StatusText, VisionEntry
+from mission.log.viewer_schema import simple_schema
 from mission.records import (
     AutopilotTarget,
     ClockSync,
@@ -126,8 +127,12 @@ ANNOTATIONS = FoxgloveChannel(
     Kept.SAMPLED,
 )
 CALIBRATION = FoxgloveChannel("/camera/calibration", "foxglove.CameraCalibration", "the camera's intrinsics", "once")
-TRANSFORM = FoxgloveChannel(
-    "/tf", "foxglove.FrameTransform", "ned in map (ENU), vehicle (FRD) in ned, camera in vehicle", "as the state"
+# After a seek a viewer is handed the last message of each topic, so that what stands still has topics of its own.
+MAP = FoxgloveChannel("/tf/map", "foxglove.FrameTransform", "ned in map (ENU, which viewers hold upright)", "once")
+MOUNT = FoxgloveChannel("/tf/camera", "foxglove.FrameTransform", "camera in vehicle", "once")
+TRANSFORM = FoxgloveChannel("/tf", "foxglove.FrameTransform", "vehicle (FRD) in ned", "as the state")
+CHASE = FoxgloveChannel(
+    "/tf/chase", "foxglove.FrameTransform", "chase (at the vehicle, ENU) in ned, for a view to follow", "as the state"
 )
 POSE = FoxgloveChannel("/vehicle/pose", "foxglove.PoseInFrame", "the vehicle's pose in ned", "as the state")
 LOCATION = FoxgloveChannel(
@@ -138,10 +143,18 @@ LOCATION = FoxgloveChannel(
     Kept.SAMPLED,
 )
 LOG = FoxgloveChannel("/log", "foxglove.Log", "events, tasks and the autopilot's words to read along", "on change")
+SHAPE = FoxgloveChannel("/vehicle/shape", "foxglove.SceneUpdate", "the vehicle to look at", "once")
+KNOWN_LINE = FoxgloveChannel(
+    "/line/scene", "foxglove.SceneUpdate", "the line where it is known to be", "at most 5 Hz", Kept.SAMPLED
+)
 SCENE = FoxgloveChannel("/truth/scene", "foxglove.SceneUpdate", "the simulated conductors and poles", "once")
 
-LOCATION_RATE_HZ = 2.0
-FOXGLOVE_CHANNELS = (IMAGE, ANNOTATIONS, CALIBRATION, TRANSFORM, POSE, LOCATION, LOG, SCENE)
+LOCATION_RATE_HZ, KNOWN_LINE_RATE_HZ = 2.0, 5.0
+FOXGLOVE_CHANNELS = (
+    *(IMAGE, ANNOTATIONS, CALIBRATION),
+    *(MAP, MOUNT, TRANSFORM, CHASE, POSE, LOCATION),
+    *(LOG, SHAPE, KNOWN_LINE, SCENE),
+)
 
 
 CAPTURE_TIMED = (VisionEntry, LineFix)
@@ -193,5 +206,5 @@ def decode(topic: str, body: bytes) -> Any:
 
 
 def json_schema(record: type) -> dict[str, Any]:
-    """Describe a record type of the table as a JSON Schema."""
-    return _ADAPTERS[record].json_schema()
+    """Describe a record type of the table as a JSON Schema that viewers can read."""
+    return simple_schema(_ADAPTERS[record].json_schema())

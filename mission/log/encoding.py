@@ -3,7 +3,7 @@
 import functools
 import json
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from typing import Any, get_args
 
 import foxglove
@@ -15,20 +15,18 @@ from drivers.camera.camera import Intrinsics
 from drivers.clock import NS_PER_S
 from mission.autopilot import GlobalPoint, Setpoint, VehicleState
 from mission.geodesy import point_at
-from mission.log import channels
+from mission.log import channels, scene
 from mission.log.records import LoggedMission, VisionEntry
 from mission.log.wording import Worded, line_of
-from mission.records import Origin, PreflightCheck, Severity, TrueLine
+from mission.records import LineFix, Origin, PreflightCheck, Severity, TrueLine
 from vision.records import VisionReport
 
 _LASTING = (LoggedMission, Origin, TrueLine, PreflightCheck)  # what who comes later wants to be told, too
 
-_MAP_FROM_NED = fox.Quaternion(x=math.sqrt(0.5), y=math.sqrt(0.5), z=0.0, w=0.0)  # ENU, which viewers hold upright
+_MAP_FROM_NED = fox.Quaternion(x=math.sqrt(0.5), y=math.sqrt(0.5), z=0.0, w=0.0)  # its own inverse: NED, ENU
 _FRD_FROM_CAMERA = fox.Quaternion(x=0.0, y=0.0, z=math.sqrt(0.5), w=math.sqrt(0.5))  # looks down, its top forward
 _DISTORTION_MODEL = {"pinhole": "plumb_bob", "fisheye": "kannala_brandt"}
-_IDENTITY = fox.Pose(position=fox.Vector3(), orientation=fox.Quaternion(w=1.0))
 _LINE_COLOR = fox.Color(r=1.0, g=0.72, b=0.1, a=1.0)
-_SUPPORT_COLOR = fox.Color(r=0.55, g=0.45, b=0.35, a=1.0)
 _LOG_LEVEL = {
     Severity.INFO: fox.LogLevel.Info,
     Severity.WARNING: fox.LogLevel.Warning,
@@ -53,7 +51,9 @@ class Encoder:
             if channel.max_rate_hz is not None
         }
         self._origin: GlobalPoint | None = None
+        self._down_m: float | None = None
         self._location_limit = channels.RateLimit(channels.LOCATION_RATE_HZ)
+        self._known_line_limit = channels.RateLimit(channels.KNOWN_LINE_RATE_HZ)
         self._lasting: dict[str, list[Callable[[], None]]] = {}
         self._json = {
             channel.record: foxglove.Channel(
@@ -136,10 +136,9 @@ class Encoder:
         attitude = _quaternion(state.roll_rad, state.pitch_rad, state.yaw_rad)
         pose = fox.Pose(position=position, orientation=attitude)
         self._show(channels.POSE, state.t_ns, fox.PoseInFrame(timestamp=stamp, frame_id="ned", pose=pose))
-        transform = fox.FrameTransform(
-            timestamp=stamp, parent_frame_id="ned", child_frame_id="vehicle", translation=position, rotation=attitude
-        )
-        self._show(channels.TRANSFORM, state.t_ns, transform)
+        self._place(channels.TRANSFORM, state.t_ns, ("ned", "vehicle"), position, attitude)
+        self._place(channels.CHASE, state.t_ns, ("ned", "chase"), position, _MAP_FROM_NED)
+        self._down_m = state.down_m
         if self._origin is not None and self._location_limit.admits(state.t_ns):
             here = point_at(Setpoint(state.north_m, state.east_m, state.down_m, state.yaw_rad), self._origin)
             fix = fox.LocationFix(
@@ -171,35 +170,32 @@ class Encoder:
             P=[fx, 0.0, cx, 0.0, 0.0, fy, cy, 0.0, 0.0, 0.0, 1.0, 0.0],
         )
         self._show(channels.CALIBRATION, self._start_ns, calibration, is_lasting=True)
-        mount = fox.FrameTransform(
-            timestamp=stamp,
-            parent_frame_id="vehicle",
-            child_frame_id="camera",
-            translation=fox.Vector3(),
-            rotation=_FRD_FROM_CAMERA,
-        )
-        self._show(channels.TRANSFORM, self._start_ns, mount, is_lasting=True)
+        here = fox.Vector3()
+        self._place(channels.MOUNT, self._start_ns, ("vehicle", "camera"), here, _FRD_FROM_CAMERA, is_lasting=True)
 
     def write_mission(self, mission: LoggedMission) -> None:
-        """Write what is flown, and how the map lies."""
+        """Write what is flown, how the map lies, and what the vehicle looks like."""
         self.write_plain(mission)
-        world = fox.FrameTransform(
-            timestamp=self._stamp(self._start_ns),
-            parent_frame_id="map",
-            child_frame_id="ned",
-            translation=fox.Vector3(),
-            rotation=_MAP_FROM_NED,
-        )
-        self._show(channels.TRANSFORM, self._start_ns, world, is_lasting=True)
+        here = fox.Vector3()
+        self._place(channels.MAP, self._start_ns, ("map", "ned"), here, _MAP_FROM_NED, is_lasting=True)
+        self._place(channels.CHASE, self._start_ns, ("ned", "chase"), here, _MAP_FROM_NED)
+        shape = scene.vehicle(self._stamp(self._start_ns))
+        self._show(channels.SHAPE, self._start_ns, shape, is_lasting=True)
 
-    def write_line(self, line: TrueLine) -> None:
+    def write_true_line(self, line: TrueLine) -> None:
         """Write the simulated line, and its scene."""
         self.write_plain(line)
-        wires = [_polyline(conductor, 0.05, _LINE_COLOR) for conductor in line.conductors_ned_m]
-        poles = [_polyline(((n, e, d), (n, e, 0.0)), 0.3, _SUPPORT_COLOR) for n, e, d in line.supports_ned_m]
-        stamp = self._stamp(self._start_ns)
-        entity = fox.SceneEntity(timestamp=stamp, frame_id="ned", id="power line", lines=[*wires, *poles])
-        self._show(channels.SCENE, self._start_ns, fox.SceneUpdate(entities=[entity]), is_lasting=True)
+        seen = scene.true_line(line, self._stamp(self._start_ns))
+        self._show(channels.SCENE, self._start_ns, seen, is_lasting=True)
+
+    def write_fix(self, fix: LineFix) -> None:
+        """Write where the line is, as far as known."""
+        self.write_plain(fix)
+        if self._down_m is None:
+            return
+        seen = scene.known_line(fix, self._down_m, self._stamp(fix.t_ns))
+        if seen is not None and self._known_line_limit.admits(fix.t_ns):
+            self._show(channels.KNOWN_LINE, fix.t_ns, seen)
 
     def write_worded(self, record: Any) -> None:
         """Write a record that also reads as a line of text."""
@@ -207,6 +203,26 @@ class Encoder:
         name, severity, text = line_of(record)
         message = fox.Log(timestamp=self._stamp(record.t_ns), level=_LOG_LEVEL[severity], name=name, message=text)
         self._show(channels.LOG, record.t_ns, message)
+
+    def _place(
+        self,
+        channel: channels.FoxgloveChannel,
+        t_ns: int,
+        parent_and_child: tuple[str, str],
+        translation: fox.Vector3,
+        rotation: fox.Quaternion,
+        *,
+        is_lasting: bool = False,
+    ) -> None:
+        parent, child = parent_and_child
+        transform = fox.FrameTransform(
+            timestamp=self._stamp(t_ns),
+            parent_frame_id=parent,
+            child_frame_id=child,
+            translation=translation,
+            rotation=rotation,
+        )
+        self._show(channel, t_ns, transform, is_lasting=is_lasting)
 
     def _show(self, channel: channels.FoxgloveChannel, t_ns: int, message: Any, *, is_lasting: bool = False) -> None:
         self._log(self._foxglove[channel.topic], message, t_ns, is_lasting=is_lasting)
@@ -229,7 +245,8 @@ _SHOWN: dict[type, Callable[[Encoder, Any], None]] = {
     VisionReport: Encoder.write_vision,
     Origin: Encoder.write_origin,
     Intrinsics: Encoder.write_camera,
-    TrueLine: Encoder.write_line,
+    TrueLine: Encoder.write_true_line,
+    LineFix: Encoder.write_fix,
 }
 
 
@@ -243,13 +260,4 @@ def _quaternion(roll_rad: float, pitch_rad: float, yaw_rad: float) -> fox.Quater
         x=sr * cp * cy - cr * sp * sy,
         y=cr * sp * cy + sr * cp * sy,
         z=cr * cp * sy - sr * sp * cy,
-    )
-
-
-def _polyline(
-    points_ned_m: Iterable[tuple[float, float, float]], width_m: float, color: fox.Color
-) -> fox.LinePrimitive:
-    points = [fox.Point3(x=north, y=east, z=down) for north, east, down in points_ned_m]
-    return fox.LinePrimitive(
-        type=fox.LinePrimitiveLineType.LineStrip, thickness=width_m, points=points, color=color, pose=_IDENTITY
     )

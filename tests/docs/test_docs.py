@@ -66,8 +66,8 @@ def test_the_layout_for_foxglove_shows_streams_that_there_are() -> None:
     fields = {c.topic: set(channels.json_schema(c.record)["properties"]) for c in channels.RECORD_CHANNELS}
     topics = {*fields, *(channel.topic for channel in channels.FOXGLOVE_CHANNELS)}
     text = json.dumps(layout["configById"])
-    named = re.findall(r'"(/[a-z_/]+)((?:\.\w+)*)"', text)
-    assert len(named) > 12
+    named = re.findall(r'"(/[a-z_/]+)((?:\.@?\w+)*)"', text)
+    assert len(named) > 18
     for topic, path in named:
         assert topic in topics
         assert not path or path.split(".")[1] in fields[topic]

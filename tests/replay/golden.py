@@ -36,7 +36,8 @@ safety: {line_height_m: 10.3}
 """
 SCENARIO = Scenario(seed=5, wind_m_s=4.0)
 _STEERED_BY = ("move_until", "align", "follow_lines")
-_NOT_NEEDED = ("/camera/lines", "/tf", "/vehicle/pose", "/vehicle/location", "/truth/scene")
+_NEEDED = (channels.IMAGE, channels.CALIBRATION, channels.LOG)
+_NOT_NEEDED = {channel.topic for channel in channels.FOXGLOVE_CHANNELS if channel not in _NEEDED}
 
 
 def make(out: Path) -> None:
