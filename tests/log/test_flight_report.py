@@ -37,8 +37,8 @@ def report(flight: Flight) -> FlightReport:
     return summarise(flight)
 
 
-def printed(report: FlightReport, width: int = 100) -> str:
-    console = Console(file=io.StringIO(), width=width)
+def printed(report: FlightReport, width: int = 100, *, is_terminal: bool = True) -> str:
+    console = Console(file=io.StringIO(), width=width, force_terminal=is_terminal, color_system=None)
     print_report(report, console)
     assert isinstance(console.file, io.StringIO)
     return console.file.getvalue()
