@@ -14,7 +14,7 @@ _MOST_SHOWN = 20
 
 @dataclass(frozen=True, slots=True)
 class Circumstances:
-    """What flights were flown with, by what it is called: each flight's own words where they differ, and those of all."""
+    """What flights were flown with, by what it is called: each one's words where they differ, and those of all."""
 
     differing: dict[str, tuple[str, ...]]
     alike: dict[str, str]

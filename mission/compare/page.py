@@ -25,7 +25,6 @@ def comparison_page(comparison: Comparison, flights: Sequence[Flight]) -> str:
     for flight in flights:
         states = [flight.states[k] for k in evenly(len(flight.states), _TRACK_POINTS).tolist()]
         tracks.append({"north": [round(s.north_m, 3) for s in states], "east": [round(s.east_m, 3) for s in states]})
-    line = next((flight.line for flight in flights if flight.line is not None), None)
     n_legs = max((len(of_flight) for of_flight in legs), default=0)
     data: dict[str, Any] = comparison.to_json() | {
         "names": list(comparison.names),
@@ -36,7 +35,7 @@ def comparison_page(comparison: Comparison, flights: Sequence[Flight]) -> str:
         "alike": [f"{name} {value}" for name, value in comparison.circumstances.alike.items()],
         "figure_rows": _figure_rows(comparison),
         "tracks": tracks,
-        "conductors": [] if line is None else [[list(p) for p in conductor] for conductor in line.conductors_ned_m],
+        "lines": _lines(flights),
         "legs": [
             {
                 "title": f"Leg {k + 1}: off the line, by the time since the leg's start",
@@ -48,6 +47,23 @@ def comparison_page(comparison: Comparison, flights: Sequence[Flight]) -> str:
         ],
     }
     return fill("compare", "Flights compared", data)
+
+
+def _lines(flights: Sequence[Flight]) -> list[dict[str, Any]]:
+    """The true lines, each once, with the flights (from 0) that were flown there."""
+    known = [(k, flight.line) for k, flight in enumerate(flights) if flight.line is not None]
+    found = []
+    for place in dict.fromkeys(line.axis_ne_m for _, line in known):
+        here = [(k, line) for k, line in known if line.axis_ne_m == place]
+        line = here[0][1]
+        found.append(
+            {
+                "flights": [k for k, _ in here],
+                "conductors": [[list(point[:2]) for point in conductor] for conductor in line.conductors_ned_m],
+                "supports": [list(support[:2]) for support in line.supports_ned_m],
+            }
+        )
+    return found
 
 
 def _figure_rows(comparison: Comparison) -> list[list[str]]:

@@ -9,7 +9,7 @@ import numpy as np
 from drivers.clock import NS_PER_S
 from mission.log.measures import Floats, line_fit_distances_m, nearest_on_axis, offboard_gaps_s
 from mission.log.reader import Flight
-from mission.log.wording import words_of
+from mission.log.wording import times_since, words_of
 from mission.records import CheckResult, Result, TaskEnded, TrueLine
 from vision.records import Track, wrap_line_angle_rad
 
@@ -191,7 +191,7 @@ class FlightReport:
         """What all times are counted from."""
         if not self.tasks:
             return "the log's start"
-        return "take-off" if self.tasks[0].task == "takeoff" else "the first task's start"
+        return times_since(self.tasks[0].task)
 
 
 def summarise(flight: Flight) -> FlightReport:

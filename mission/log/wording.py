@@ -70,3 +70,8 @@ def duration(seconds: float) -> str:
     """Spell a duration: 37 s, 1 min 33 s."""
     minutes, whole_s = divmod(round(seconds), 60)
     return f"{minutes} min {whole_s:02d} s" if minutes else f"{whole_s} s"
+
+
+def times_since(first_task: str) -> str:
+    """What a flight's times are counted from: the start of its first task, which need not be a take-off."""
+    return "take-off" if first_task == "takeoff" else "the first task's start"
