@@ -58,7 +58,8 @@
 
   function heading() {
     $("name").textContent = flight.name;
-    const tone = { completed: "good", failed: "bad", unfinished: "bad" }[report.result] ?? "warn";
+    const isHurt = report.events.some((event) => event.severity === "error"); // it may have fallen over after a mission that it completed
+    const tone = { completed: isHurt ? "warn" : "good", failed: "bad", unfinished: "bad" }[report.result] ?? "warn";
     $("result").textContent = flight.headline;
     $("result").classList.add(tone);
     $("reason").textContent = report.reason;
@@ -73,7 +74,7 @@
     if (report.yaw_error) tiles.push([`${report.yaw_error.median_deg.toFixed(1)}°`, "heading error, median"]);
     if (report.vision.latency_ms) tiles.push([`${report.vision.latency_ms.p50.toFixed(0)} ms`, "frame to estimate, median"]);
     if (report.landing) {
-      const where = report.is_truncated ? "from the start, where the log ends" : report.landing.is_disarmed ? (report.result === "completed" ? "landed from the start" : "from the start, at the end") : "from the start, still armed";
+      const where = report.is_truncated ? "from the start, where the log ends" : report.landing.is_disarmed ? (report.result === "completed" && !isHurt ? "landed from the start" : "from the start, at the end") : "from the start, still armed";
       tiles.push([`${report.landing.distance_m.toFixed(2)} m`, where]);
     }
     for (const [figure, what] of tiles) $("tiles").append(make("div", { class: "tile" }, make("b", {}, figure), make("span", {}, what)));
@@ -579,7 +580,7 @@
       ...(report.preflight.failures.length + report.preflight.warnings.length || !report.preflight.n_checks ? [] : [{ cells: [make("span", { class: "ok" }, "all passed")] }]),
     ]);
     table("texts", "The autopilot's own words", [], flight.texts.map(([t, text]) => ({ cells: [time(t), text], t })));
-    table("facts", "Flown with", [], Object.entries(flight.facts).map(([key, value]) => ({ cells: [make("span", { class: "dim" }, key), value] })));
+    table("facts", "Flown with", [], Object.entries(flight.facts).map(([key, value]) => ({ cells: [{ text: key, kind: "dim fact" }, value] })));
   }
 
   heading();
