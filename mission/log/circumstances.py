@@ -45,7 +45,7 @@ def settings_of(flight: Flight, attachment: str) -> dict[str, str]:
     return dict(_leaves("", _object(flight.attachments.get(attachment))))
 
 
-def _object(text: str | None) -> dict[str, Any]:
+def _object(text: bytes | str | None) -> dict[str, Any]:
     """A JSON object; empty where there is none. A log may come from elsewhere, and its words need not be ours."""
     try:
         found = json.loads(text or "{}")

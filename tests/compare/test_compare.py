@@ -47,7 +47,7 @@ def test_a_change_is_what_the_second_has_more(logs: tuple[Path, Path]) -> None:
 
 
 def with_circumstances(flight: Flight, metadata: dict[str, str], **attachments: dict[str, object]) -> Flight:
-    told = {f"{name}.json": json.dumps(content) for name, content in attachments.items()}
+    told = {f"{name}.json": json.dumps(content).encode() for name, content in attachments.items()}
     return replace(flight, mission=replace(flight.mission, metadata=metadata), attachments=told)
 
 

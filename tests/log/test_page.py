@@ -79,7 +79,7 @@ def test_a_page_says_with_units_what_was_flown_with(flight: Flight) -> None:
     told = replace(
         flight,
         mission=replace(flight.mission, metadata={"wind_m_s": "8", "wind_from_deg": "90", "speed": "2"}),
-        attachments={"host.json": json.dumps(host), "versions.json": "no JSON"},
+        attachments={"host.json": json.dumps(host).encode(), "versions.json": b"no JSON"},
     )
     facts = page_data(told, inspect_flight(told))["facts"]
     assert (facts["wind"], facts["wind from"], facts["speed"]) == ("8 m/s", "90°", "2 times real time")
