@@ -78,7 +78,7 @@ def compare_reports(names: Sequence[str], reports: Sequence[FlightReport], circu
 
 def distinct_names(logs: Sequence[Path]) -> list[str]:
     """What each log is called: its name without its ending, with its folders where others are called alike."""
-    stems = [log.stem for log in logs]
+    stems = [log.stem for log in dict.fromkeys(logs)]
     return [str(log.with_suffix("")) if stems.count(log.stem) > 1 else log.stem for log in logs]
 
 

@@ -121,6 +121,7 @@ def test_every_figure_has_a_name_for_people(logs: tuple[Path, Path]) -> None:
 
 def test_logs_that_are_called_alike_are_told_apart() -> None:
     assert distinct_names([Path("a/x.mcap"), Path("b/x.mcap"), Path("y.mcap")]) == ["a/x", "b/x", "y"]
+    assert distinct_names([Path("a/x.mcap"), Path("a/x.mcap")]) == ["x", "x"]
 
 
 def task(name: str) -> TaskSummary:

@@ -165,7 +165,7 @@ def test_the_way_down_has_a_name_and_trouble_is_shown_first(browser: Browser, fl
     assert browser.evaluate("lineflight.now") == pytest.approx(end_s, abs=0.01)
     browser.evaluate(f"lineflight.setTime({end_s + 5.0})")
     assert browser.evaluate("document.getElementById('now').textContent").startswith("task going down")
-    assert browser.evaluate("document.getElementById('begun').textContent").endswith("times count from take-off")
+    assert browser.evaluate("document.getElementById('begun').textContent").endswith("times from take-off")
     keep(browser, f"failed-{browser.evaluate('innerWidth')}")
 
 

@@ -63,7 +63,7 @@
     $("result").textContent = flight.headline;
     $("result").classList.add(tone);
     $("reason").textContent = report.reason;
-    $("begun").textContent = `${flight.begun} · ${counted(report.tasks.length, "task")} · ${clock(report.duration_s)} min · times count from ${flight.times_since}`;
+    $("begun").textContent = `${flight.begun} · ${counted(report.tasks.length, "task")} · ${clock(report.duration_s)} min · times from ${flight.times_since}`;
     $("log").textContent = flight.log;
     $("mission").textContent = flight.mission_text;
     const tiles = [];
@@ -133,7 +133,7 @@
       const tight = boxes.filter((box) => box.scrollWidth > box.clientWidth);
       for (const box of tight) box.classList.add("tight");
     };
-    fit();
+    requestAnimationFrame(fit);
     addEventListener("resize", fit);
     for (const trouble of report.excursions) {
       const mark = make("div", { class: "mark", title: `${words(trouble.kind)}: ${trouble.culprit}` });
