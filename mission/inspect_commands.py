@@ -55,7 +55,8 @@ def compare(
     """
     from rich.console import Console
 
-    from mission.compare.comparison import compare_reports
+    from mission.compare.circumstances import circumstances_of
+    from mission.compare.comparison import compare_reports, distinct_names
     from mission.compare.conditions import ConditionError, parse_condition
     from mission.compare.report import print_comparison
     from mission.log.inspection import inspect_flight
@@ -65,7 +66,8 @@ def compare(
         fail("compare needs two logs at least; name another one.", EXIT_BAD_INPUT)
     try:
         flights = [read_flight(log) for log in logs]
-        comparison = compare_reports([log.stem for log in logs], [inspect_flight(flight) for flight in flights])
+        reports = [inspect_flight(flight) for flight in flights]
+        comparison = compare_reports(distinct_names(logs), reports, circumstances_of(flights))
         conditions = [parse_condition(text, comparison.figure_names) for text in fail_if or ()]
     except (LogError, ConditionError) as error:
         fail(str(error), EXIT_BAD_INPUT)
@@ -76,8 +78,7 @@ def compare(
     if as_json:
         typer.echo(json.dumps(comparison.to_json() | {"failures": failures}))
     else:
-        # Into a file there is no terminal whose width would cut figures off.
-        print_comparison(comparison, Console(width=None if sys.stdout.isatty() else 200))
+        print_comparison(comparison, Console())
     if html is not None:
         from mission.compare.page import comparison_page
 

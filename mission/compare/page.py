@@ -7,6 +7,7 @@ import numpy as np
 
 from drivers.clock import NS_PER_S
 from mission.compare.comparison import Comparison
+from mission.compare.figure_words import change_words, label_of, value_words
 from mission.log.blame.signals import knowledge_of, lateral_of, motion_of
 from mission.log.page.curves import listed
 from mission.log.page.page import fill
@@ -24,12 +25,17 @@ def comparison_page(comparison: Comparison, flights: Sequence[Flight]) -> str:
     for flight in flights:
         states = [flight.states[k] for k in evenly(len(flight.states), _TRACK_POINTS).tolist()]
         tracks.append({"north": [round(s.north_m, 3) for s in states], "east": [round(s.east_m, 3) for s in states]})
-    line = next((flight.line for flight in flights if flight.line is not None), None)
     n_legs = max((len(of_flight) for of_flight in legs), default=0)
     data: dict[str, Any] = comparison.to_json() | {
         "names": list(comparison.names),
+        "headlines": [report.headline for report in comparison.reports],
+        "reasons": [report.reason for report in comparison.reports],
+        "differing": [[name, *values] for name, values in comparison.circumstances.shown.items()],
+        "n_not_shown": comparison.circumstances.n_not_shown,
+        "alike": [f"{name} {value}" for name, value in comparison.circumstances.alike.items()],
+        "figure_rows": _figure_rows(comparison),
         "tracks": tracks,
-        "conductors": [] if line is None else [[list(p) for p in conductor] for conductor in line.conductors_ned_m],
+        "lines": _lines(flights),
         "legs": [
             {
                 "title": f"Leg {k + 1}: off the line, by the time since the leg's start",
@@ -41,6 +47,35 @@ def comparison_page(comparison: Comparison, flights: Sequence[Flight]) -> str:
         ],
     }
     return fill("compare", "Flights compared", data)
+
+
+def _lines(flights: Sequence[Flight]) -> list[dict[str, Any]]:
+    """The true lines, each once, with the flights (from 0) that were flown there."""
+    known = [(k, flight.line) for k, flight in enumerate(flights) if flight.line is not None]
+    found = []
+    for place in dict.fromkeys(line.axis_ne_m for _, line in known):
+        here = [(k, line) for k, line in known if line.axis_ne_m == place]
+        line = here[0][1]
+        found.append(
+            {
+                "flights": [k for k, _ in here],
+                "conductors": [[list(point[:2]) for point in conductor] for conductor in line.conductors_ned_m],
+                "supports": [list(support[:2]) for support in line.supports_ned_m],
+            }
+        )
+    return found
+
+
+def _figure_rows(comparison: Comparison) -> list[list[str]]:
+    """A row of words for each figure that any flight has: what it is called, the values, the changes."""
+    rows = []
+    for name in comparison.figure_names:
+        values = [figures.get(name) for figures in comparison.figures]
+        if any(value is not None for value in values):
+            changes = [comparison.change(name, other) for other in range(1, len(values))]
+            spelled = [value_words(name, value) for value in values]
+            rows.append([label_of(name), *spelled, *(change_words(name, change) for change in changes)])
+    return rows
 
 
 def _legs(flight: Flight) -> list[dict[str, Any]]:

@@ -10,8 +10,8 @@ from drivers.camera.camera import Intrinsics
 from drivers.clock import NS_PER_S
 from mission.autopilot import VehicleState
 from mission.live.settings import Batch, Briefing
-from mission.log.records import LoggedMission, StatusText
-from mission.log.wording import line_of
+from mission.log.records import StatusText
+from mission.log.wording import line_of, times_since
 from mission.records import (
     Event,
     LineFix,
@@ -47,7 +47,7 @@ class Board:
         self.ended: MissionEnded | None = None
         self._n_dropped = 0
         self._briefing = Briefing("", ())
-        self._start_ns: int | None = None
+        self._start_ns: int | None = None  # of the first task, from which inspect counts, too
         self._newest_ns = 0
         self._progress: Progress | None = None
         self._vehicle: VehicleState | None = None
@@ -58,7 +58,8 @@ class Board:
         self._true_axis_ne_m: tuple[tuple[float, float], ...] = ()
         self._track = _Track()
         self._fixes = _Track()
-        self._events: deque[dict[str, Any]] = deque(maxlen=_MAX_EVENTS)
+        self._times_since = "take-off"
+        self._events: deque[tuple[int, dict[str, Any]]] = deque(maxlen=_MAX_EVENTS)
         self._checks: dict[str, dict[str, Any]] = {}
 
     def add(self, batch: Batch, now_s: float) -> None:
@@ -73,11 +74,16 @@ class Board:
                 take(self, record)
 
     def state(self, now_s: float) -> dict[str, Any]:
-        """Where the flight stands, at `now_s` [s, the clock of `add`]; angles in degrees, for people."""
+        """Where the flight stands, at `now_s` [s, the clock of `add`]; angles in degrees, for people.
+
+        `t_s` [s] counts from the start of the first task, as a report's times do: None before it, negative for what
+        came before it. It stands still when the mission has ended.
+        """
         return {
             "mission": self._briefing.mission,
             "tasks": self._briefing.tasks,
-            "t_s": self._flight_s(self._newest_ns),
+            "t_s": self._flight_s(self._newest_ns if self.ended is None else self.ended.t_ns),
+            "times_since": self._times_since,
             "progress": None if self._progress is None else _progress_words(self._progress),
             "vehicle": None if self._vehicle is None else _vehicle_words(self._vehicle),
             "vehicle_age_s": _rounded(now_s - self._vehicle_came_s),
@@ -85,7 +91,7 @@ class Board:
             "frame": None if self.frame is None else {"seq": self.frame.seq, "lines_px": self.frame.lines_px},
             "camera_px": None if self._camera is None else (self._camera.width_px, self._camera.height_px),
             "line": None if self._fix is None else _fix_words(self._fix),
-            "events": list(self._events),
+            "events": [{"t_s": self._flight_s(t_ns)} | words for t_ns, words in self._events],
             "checks": list(self._checks.values()),
             "ended": None
             if self.ended is None
@@ -100,10 +106,6 @@ class Board:
     def take_briefing(self, briefing: Briefing) -> None:
         """A flight begins."""
         self._briefing = briefing
-
-    def take_mission(self, mission: LoggedMission) -> None:
-        """The log begins, and with it the page's time."""
-        self._start_ns = self._newest_ns = mission.start_ns
 
     def take_progress(self, progress: Progress) -> None:
         """Where the executive stands."""
@@ -144,7 +146,10 @@ class Board:
         if isinstance(record, StatusText) and record.text.startswith(_CHATTER):
             return
         who, severity, text = line_of(record)
-        self._events.append({"t_s": self._flight_s(record.t_ns), "who": who, "severity": severity, "text": text})
+        self._events.append((record.t_ns, {"who": who, "severity": severity, "text": text}))
+        if isinstance(record, TaskStarted) and self._start_ns is None:
+            self._start_ns = record.t_ns
+            self._times_since = times_since(record.task)
         if isinstance(record, MissionEnded):
             self.ended = record
 
@@ -154,7 +159,6 @@ class Board:
 
 _TAKE: dict[type, Callable[[Board, Any], None]] = {
     Briefing: Board.take_briefing,
-    LoggedMission: Board.take_mission,
     Progress: Board.take_progress,
     VehicleState: Board.take_vehicle,
     VisionReport: Board.take_sight,

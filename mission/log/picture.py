@@ -12,7 +12,7 @@ from mission.log.reader import Flight
 from mission.log.strip_chart import Strip, draw_strip
 from mission.log.summary import FOLLOW_TASK, FlightReport, flight_start_ns, true_axis
 from mission.log.track_map import MapBackground, MapView, draw_map, map_view
-from mission.log.wording import words_of
+from mission.log.wording import counted
 from mission.records import Result
 from vision.records import VisionReport
 
@@ -47,8 +47,9 @@ def _draw_heading(canvas: Canvas, report: FlightReport) -> None:
     minutes, seconds = divmod(round(report.duration_s), 60)
     canvas.text((28, 48), report.mission, 32, is_bold=True)
     color = GOOD if report.result == Result.COMPLETED else BAD
-    width_px = canvas.text((28, 78), words_of(report.result), 18, color, is_bold=True)
-    canvas.text((28 + width_px + 12, 78), f"{minutes}:{seconds:02d} min, {len(report.tasks)} tasks", 18, DIM_INK)
+    width_px = canvas.text((28, 78), report.headline, 18, color, is_bold=True)
+    words = f"{minutes}:{seconds:02d} min, {counted(len(report.tasks), 'task')}"
+    canvas.text((28 + width_px + 12, 78), words, 18, DIM_INK)
     tiles = []
     if report.lateral is not None:
         tiles.append((f"{report.lateral.mean_m:.2f} m", "mean distance from the line"))

@@ -11,12 +11,15 @@ from drivers.clock import NS_PER_S
 from mission.log.damage import words_of_damage
 from mission.log.measures import Floats, line_fit_distances_m, nearest_on_axis, offboard_gaps_s
 from mission.log.reader import Flight
-from mission.log.wording import words_of
-from mission.records import CheckResult, TaskEnded, TrueLine
+from mission.log.wording import times_since, words_of
+from mission.records import CheckResult, Result, TaskEnded, TrueLine
 from vision.records import Track, wrap_line_angle_rad
 
 FOLLOW_TASK = "follow_lines"
 UNFINISHED = "unfinished"
+REJOINING_EVENT = "rejoining"
+
+_LEAST_STAGE_NS = NS_PER_S // 2  # who takes the vehicle over ends the flight at once: nothing comes after that
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,13 +35,22 @@ class TaskSpan:
 
 @dataclass(frozen=True, slots=True)
 class TaskSummary:
-    """A task as flown; times [s] from the log's start."""
+    """A task as flown; times [s] from the flight's start."""
 
     task: str
     start_s: float
     end_s: float | None
     result: str
     reason: str
+
+
+@dataclass(frozen=True, slots=True)
+class StageSummary:
+    """A stretch outside the tasks, as going down after one that failed; times [s] from the flight's start."""
+
+    name: str
+    start_s: float
+    end_s: float
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,7 +131,7 @@ class PreflightSummary:
 
 @dataclass(frozen=True, slots=True)
 class EventSummary:
-    """An event; `t_s` [s] from the log's start."""
+    """An event; `t_s` [s] from the flight's start."""
 
     t_s: float
     name: str
@@ -149,7 +161,9 @@ class FlightReport:
     """A flight in figures. Times [s] are since the flight's start (`flight_start_ns`).
 
     `lateral` and `yaw_error` need ground truth, which only a simulated flight has. `excursions` are empty where nobody
-    looked for them (mission/log/inspection.py does). `damage` says in a sentence what of the log could not be read.
+    looked for them (mission/log/inspection.py does). `damage` says in a sentence what of the log could not be read,
+    `ended_in` names the task in which a mission ended that was not completed; `stages` are what was flown outside the
+    tasks.
     """
 
     mission: str
@@ -168,6 +182,20 @@ class FlightReport:
     events: tuple[EventSummary, ...]
     excursions: tuple[ExcursionSummary, ...] = ()
     damage: str | None = None
+    ended_in: str | None = None
+    stages: tuple[StageSummary, ...] = ()
+
+    @property
+    def headline(self) -> str:
+        """How the flight ended, and in which task where it was not completed: `timed out in align`."""
+        return words_of(self.result) + ("" if self.ended_in is None else f" in {words_of(self.ended_in)}")
+
+    @property
+    def times_since(self) -> str:
+        """What all times are counted from."""
+        if not self.tasks:
+            return "the log's start"
+        return times_since(self.tasks[0].task)
 
 
 def summarise(flight: Flight) -> FlightReport:
@@ -213,6 +241,11 @@ def summarise(flight: Flight) -> FlightReport:
             for event in flight.events
         ),
         damage=None if flight.damage is None else words_of_damage(flight.damage),
+        ended_in=spans[-1].task if spans and spans[-1].result != Result.COMPLETED else None,
+        stages=tuple(
+            StageSummary(name, since_start_s(start_ns), since_start_s(stage_end_ns))
+            for name, start_ns, stage_end_ns in _stages(flight, spans, end_ns)
+        ),
     )
 
 
@@ -244,6 +277,21 @@ def task_spans(flight: Flight) -> tuple[TaskSpan, ...]:
             unpaired.remove(ended)
             spans.append(TaskSpan(started.task, started.t_ns, ended.t_ns, str(ended.result), ended.reason))
     return tuple(spans)
+
+
+def _stages(flight: Flight, spans: tuple[TaskSpan, ...], end_ns: int) -> list[tuple[str, int, int]]:
+    """What was flown before the first task, and from the end of one that was not completed to the flight's end."""
+    if not spans:
+        return []
+    stages = []
+    rejoining = next((event for event in flight.events if event.name == REJOINING_EVENT), None)
+    if rejoining is not None:  # a mission that is resumed flies to where it was interrupted first
+        later_ns = [span.start_ns for span in spans if span.start_ns > rejoining.t_ns]
+        stages.append(("rejoining", rejoining.t_ns, min(later_ns, default=end_ns)))
+    last = spans[-1]
+    if last.end_ns is not None and last.result != Result.COMPLETED and end_ns - last.end_ns >= _LEAST_STAGE_NS:
+        stages.append(("going down", last.end_ns, end_ns))
+    return stages
 
 
 def true_axis(line: TrueLine) -> Floats:

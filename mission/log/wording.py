@@ -27,14 +27,15 @@ def line_of(record: Worded) -> tuple[str, Severity, str]:
     """Who speaks, how much it matters, and the line."""
     match record:
         case Event():
-            reaction = "" if record.reaction == "continue" else f" [{record.reaction}]"
-            return "event", record.severity, f"{record.name}: {record.message}{reaction}"
+            reaction = "" if record.reaction == "continue" else f" [{words_of(record.reaction)}]"
+            return "event", record.severity, f"{words_of(record.name)}: {record.message}{reaction}"
         case PreflightCheck():
             return "preflight", _CHECK_SEVERITY[record.result], f"{words_of(record.name)}: {record.reason}"
         case TaskStarted():
-            return "mission", Severity.INFO, f"{record.task} started"
+            return "mission", Severity.INFO, f"{words_of(record.task)} started"
         case TaskEnded():
-            return "mission", severity_of(record.result), f"{record.task} {words_of(record.result)}: {record.reason}"
+            ended = f"{words_of(record.task)} {words_of(record.result)}"
+            return "mission", severity_of(record.result), f"{ended}: {record.reason}"
         case MissionEnded():
             return "mission", severity_of(record.result), f"mission {words_of(record.result)}: {record.reason}"
         case StatusText():
@@ -51,3 +52,26 @@ def severity_of(result: Result) -> Severity:
 def words_of(result: str) -> str:
     """Spell a result as people write it: taken_over becomes 'taken over'."""
     return result.replace("_", " ")
+
+
+def counted(n: int, noun: str) -> str:
+    """Spell a count: 1 task, 2 tasks."""
+    return f"{n} {noun}" if n == 1 else f"{n} {noun}s"
+
+
+def with_unit(value: float, unit: str, digits: int = 2) -> str:
+    """Spell a value with its unit: 0.25 m, 45°."""
+    if unit in ("deg", "°"):
+        return f"{value:.0f}°" if abs(value) >= 10.0 else f"{value:.1f}°"
+    return f"{value:.{digits}f} {unit}"
+
+
+def duration(seconds: float) -> str:
+    """Spell a duration: 37 s, 1 min 33 s."""
+    minutes, whole_s = divmod(round(seconds), 60)
+    return f"{minutes} min {whole_s:02d} s" if minutes else f"{whole_s} s"
+
+
+def times_since(first_task: str) -> str:
+    """What a flight's times are counted from: the start of its first task, which need not be a take-off."""
+    return "take-off" if first_task == "takeoff" else "the first task's start"

@@ -9,12 +9,14 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from mission.autopilot import VehicleState
-from mission.compare.comparison import compare_reports
+from mission.compare.circumstances import circumstances_of
+from mission.compare.comparison import compare_reports, distinct_names
 from mission.compare.conditions import ConditionError, parse_condition
-from mission.compare.figures import pair_tasks
+from mission.compare.figure_words import change_words, label_of, value_words
+from mission.compare.figures import figures_of, pair_tasks
 from mission.ending import EXIT_BAD_INPUT, EXIT_DIFFERENT, EXIT_FAILED_FILE
 from mission.log.inspection import inspect_flight
-from mission.log.reader import read_flight
+from mission.log.reader import Flight, read_flight
 from mission.log.summary import TaskSummary
 from mission.records import TaskEnded, TaskStarted, TruePose
 from tests.log.synthetic_flight import fly, write_log
@@ -36,11 +38,90 @@ def shifted(item: object) -> object:
 
 
 def test_a_change_is_what_the_second_has_more(logs: tuple[Path, Path]) -> None:
-    comparison = compare_reports(["a", "b"], [inspect_flight(read_flight(log)) for log in logs])
+    flights = [read_flight(log) for log in logs]
+    comparison = compare_reports(["a", "b"], [inspect_flight(f) for f in flights], circumstances_of(flights))
     assert comparison.change("lateral_mean_m", 1) == pytest.approx(0.32, abs=0.05)
     assert comparison.change("leg_1_straightness_mean_m", 1) == pytest.approx(0.0, abs=1e-9)
     assert comparison.change("duration_s", 1) == 0.0
     assert all(pair.first is not None and pair.other is not None for pair in comparison.tasks[0])
+
+
+def with_circumstances(flight: Flight, metadata: dict[str, str], **attachments: dict[str, object]) -> Flight:
+    told = {f"{name}.json": json.dumps(content).encode() for name, content in attachments.items()}
+    return replace(flight, mission=replace(flight.mission, metadata=metadata), attachments=told)
+
+
+def test_what_flights_were_flown_with_is_told_where_it_differs(logs: tuple[Path, Path]) -> None:
+    flight = read_flight(logs[0])
+    first = with_circumstances(
+        flight,
+        {"command": "dry-run", "world": "corner", "wind_m_s": "0", "seed": "1"},
+        versions={"lineflight": "0.1.0", "numpy": "2.4"},
+        parameters={"MPC_XY_P": 0.95, "MPC_Z_P": 1.0},
+        plan={"tasks": [{"altitude_m": 5}]},
+    )
+    other = with_circumstances(
+        flight,
+        {"command": "dry-run", "world": "hills", "wind_m_s": "8", "seed": "1", "light": "dusk"},
+        versions={"lineflight": "0.2.0", "numpy": "2.4"},
+        parameters={"MPC_XY_P": 0.8, "MPC_Z_P": 1.0},
+        plan={"tasks": [{"altitude_m": 7.5}]},
+    )
+    found = circumstances_of([first, other])
+    assert found.differing == {
+        "world": ("corner", "hills"),
+        "wind": ("0 m/s", "8 m/s"),
+        "light": ("not told", "dusk"),
+        "lineflight": ("0.1.0", "0.2.0"),
+        "tasks.1.altitude_m (mission)": ("5", "7.5"),
+        "MPC_XY_P (autopilot)": ("0.95", "0.8"),
+    }
+    assert found.alike["seed"] == "1"
+    assert found.alike["command"] == "dry-run"
+    assert circumstances_of([first, first]).differing == {}
+
+
+def test_settings_of_other_missions_are_not_held_against_each_other(logs: tuple[Path, Path]) -> None:
+    flight = with_circumstances(read_flight(logs[0]), {}, plan={"name": "a"})
+    other = with_circumstances(replace(flight, mission=replace(flight.mission, name="b")), {}, plan={"name": "b"})
+    assert circumstances_of([flight, other]).differing == {"mission": ("follow_line", "b")}
+
+
+def test_people_read_the_first_of_many_settings_and_programs_all(logs: tuple[Path, Path]) -> None:
+    flight = read_flight(logs[0])
+    many = [with_circumstances(flight, {}, parameters={f"P{k}": k + by for k in range(100)}) for by in (0, 1)]
+    found = circumstances_of(many)
+    assert len(found.differing) == 100
+    assert len(found.shown) + found.n_not_shown == 100
+    assert found.n_not_shown > 0
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "words", "change"),
+    [
+        ("events", 5.0, "5", "+5"),
+        ("lateral_p95_m", 0.1205, "0.120 m", "+0.120 m"),
+        ("setpoint_gap_max_ms", 50.0, "50.0 ms", "+50.0 ms"),
+        ("setpoint_gap_max_ms", -1e-11, "-0.0 ms", "same"),
+        ("setpoint_rate_hz", 20.0, "20.0 Hz", "+20.0 Hz"),
+        ("yaw_error_p95_deg", -2.5, "-2.50°", "-2.50°"),
+        ("estimates_share", 0.5, "50.0 %", "+50.0 %"),
+        ("duration_s", None, "-", "-"),
+    ],
+)
+def test_figures_bear_their_units(name: str, value: float | None, words: str, change: str) -> None:
+    assert (value_words(name, value), change_words(name, value)) == (words, change)
+
+
+def test_every_figure_has_a_name_for_people(logs: tuple[Path, Path]) -> None:
+    labels = [label_of(name) for name in figures_of(inspect_flight(read_flight(logs[0])))]
+    assert len(set(labels)) == len(labels)
+    assert [label for label in labels if "_" in label or label.endswith((" m", " ms", " deg", " hz"))] == []
+
+
+def test_logs_that_are_called_alike_are_told_apart() -> None:
+    assert distinct_names([Path("a/x.mcap"), Path("b/x.mcap"), Path("y.mcap")]) == ["a/x", "b/x", "y"]
+    assert distinct_names([Path("a/x.mcap"), Path("a/x.mcap")]) == ["x", "x"]
 
 
 def task(name: str) -> TaskSummary:
@@ -133,6 +214,8 @@ def test_the_command_compares_and_fails_where_it_is_told_to(logs: tuple[Path, Pa
     assert "lateral_p95_m is 0.7" in ran.err
     assert "lateral_mean_m" in ran.out
     assert "first: follow_line, completed: Every task was flown" in ran.out
+    assert ran.out.index("same for all: ") < ran.out.index("Figures")
+    assert all(len(line) == len(line.rstrip()) for line in ran.out.splitlines())
     assert page.stat().st_size > 1_000_000
     fine = lineflight("compare", *logs, "--json", "--fail-if", "lateral_p95_m>5")
     assert fine.code == 0
@@ -140,6 +223,8 @@ def test_the_command_compares_and_fails_where_it_is_told_to(logs: tuple[Path, Pa
     assert answer["failures"] == []
     assert answer["figures"]["duration_s"][0] == answer["figures"]["duration_s"][1]
     assert answer["tasks"][0][0]["task"] == "takeoff"
+    assert answer["flown_with"]["differing"] == {}
+    assert answer["flown_with"]["alike"]["mission"] == "follow_line"
 
 
 def test_what_cannot_be_compared_is_refused_in_a_sentence(logs: tuple[Path, Path], tmp_path: Path) -> None:
@@ -159,4 +244,4 @@ def test_a_task_that_only_one_has_flown_is_told(logs: tuple[Path, Path], tmp_pat
     kept = [(t, item) for t, item in fly() if not (isinstance(item, TaskStarted | TaskEnded) and item.task == "align")]
     write_log(lacking, kept)
     ran = lineflight("compare", logs[0], lacking)
-    assert "first flew align, lacking did not" in ran.out
+    assert "align: flown in 1, not in 2" in ran.out

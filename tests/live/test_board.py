@@ -11,7 +11,7 @@ from mission.autopilot import Setpoint, VehicleState
 from mission.live.board import Board
 from mission.live.settings import Batch, Briefing
 from mission.log.records import LoggedMission, StatusText
-from mission.records import CheckResult, LineFix, PreflightCheck
+from mission.records import CheckResult, LineFix, MissionEnded, PreflightCheck, Result, TaskStarted
 from mission.reporting import Progress
 from tests.log.synthetic_flight import LINE_NORTH_M, START_NS, TASKS, fly
 from vision.records import VisionReport
@@ -95,10 +95,31 @@ def test_before_the_first_record_there_is_nothing_to_tell() -> None:
     assert (state["vehicle"], state["frame"], state["ended"], state["t_s"]) == (None, None, None, None)
 
 
+def test_times_count_from_the_first_task_as_in_a_report() -> None:
+    board = Board()
+    before, start_ns = StatusText(START_NS, "Armed"), START_NS + 12 * NS_PER_S
+    board.add(Batch(0, (MISSION, before)), 0.0)
+    state = board.state(0.0)
+    assert (state["t_s"], state["times_since"], state["events"][0]["t_s"]) == (None, "take-off", None)
+    board.add(Batch(0, (TaskStarted(start_ns, 0, "takeoff"), TaskStarted(start_ns + 5 * NS_PER_S, 1, "ascend"))), 0.0)
+    state = board.state(0.0)
+    assert (state["t_s"], [event["t_s"] for event in state["events"]]) == (5.0, [-12.0, 0.0, 5.0])
+    ended = MissionEnded(start_ns + 9 * NS_PER_S, Result.COMPLETED, "landed")
+    board.add(Batch(0, (ended, StatusText(start_ns + 20 * NS_PER_S, "Disarmed"))), 0.0)
+    assert board.state(0.0)["t_s"] == 9.0
+
+
+def test_a_flight_that_is_resumed_in_the_air_does_not_count_from_a_take_off() -> None:
+    board = Board()
+    board.add(Batch(0, (TaskStarted(START_NS, 4, "follow_lines"),)), 0.0)
+    assert board.state(0.0)["times_since"] == "the first task's start"
+
+
 def test_events_are_bounded_and_without_chatter() -> None:
     board = Board()
+    start = TaskStarted(START_NS, 0, "takeoff")
     words = [StatusText(START_NS + i * NS_PER_S, f"word {i}") for i in range(500)]
-    board.add(Batch(3, (MISSION, *words, StatusText(START_NS, "mavsdk DEBUG: word 499"))), 0.0)
+    board.add(Batch(3, (start, *words, StatusText(START_NS, "mavsdk DEBUG: word 499"))), 0.0)
     state = board.state(0.0)
     assert [event["text"] for event in state["events"]] == [f"word {i}" for i in range(400, 500)]
     assert state["events"][-1]["t_s"] == 499.0

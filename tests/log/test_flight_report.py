@@ -18,6 +18,7 @@ from mission.log.measures import line_fit_distances_m, nearest_on_axis, offboard
 from mission.log.reader import Flight, read_flight
 from mission.log.report import print_report
 from mission.log.summary import FlightReport, PreflightSummary, summarise, to_json
+from mission.log.wording import counted
 from mission.records import CheckResult, Event, MissionEnded, PreflightCheck, Result, Severity, TaskEnded, TruePose
 from tests.log.synthetic_flight import START_NS, SWAY_M, TASKS, fly, write_log
 from vision.records import Track, Trouble
@@ -37,8 +38,8 @@ def report(flight: Flight) -> FlightReport:
     return summarise(flight)
 
 
-def printed(report: FlightReport, width: int = 100) -> str:
-    console = Console(file=io.StringIO(), width=width)
+def printed(report: FlightReport, width: int = 100, *, is_terminal: bool = True) -> str:
+    console = Console(file=io.StringIO(), width=width, force_terminal=is_terminal, color_system=None)
     print_report(report, console)
     assert isinstance(console.file, io.StringIO)
     return console.file.getvalue()
@@ -222,6 +223,61 @@ def test_the_page_tells_tasks_figures_and_events(report: FlightReport) -> None:
     ):
         assert words in text
     assert text.index("Tasks") < text.index("Figures") < text.index("Events")
+
+
+LONG = "the vehicle has been tilted by 45 degrees for 3 s, which is about as long as anybody can read on one line of it"
+
+
+@pytest.fixture
+def timed_out(flight: Flight) -> Flight:
+    """The same flight, whose align took too long: 10 s of going down come after it."""
+    end_ns = flight.tasks_started[3].t_ns + 6 * NS_PER_S
+    ended = replace(flight.tasks_ended[3], t_ns=end_ns, result=Result.TIMED_OUT, reason=LONG)
+    return replace(
+        flight,
+        tasks_started=flight.tasks_started[:4],
+        tasks_ended=(*flight.tasks_ended[:3], ended),
+        events=(Event(end_ns, "task_timed_out", Severity.ERROR, LONG, "land_clear"),),
+        mission_ended=MissionEnded(end_ns + 10 * NS_PER_S, Result.TIMED_OUT, LONG),
+    )
+
+
+def test_the_headline_names_the_task_that_was_not_completed(timed_out: Flight, report: FlightReport) -> None:
+    assert summarise(timed_out).headline == "timed out in align"
+    assert "follow_line  timed out in align  40 s, counted from take-off" in printed(summarise(timed_out))
+    assert report.headline == "completed"
+
+
+def test_the_way_down_after_a_failed_task_is_a_stage(timed_out: Flight, report: FlightReport) -> None:
+    (stage,) = summarise(timed_out).stages
+    assert (stage.name, stage.start_s, stage.end_s) == ("going down", 30.0, 40.0)
+    assert to_json(summarise(timed_out))["stages"] == [{"name": "going down", "start_s": 30.0, "end_s": 40.0}]
+    assert report.stages == ()
+
+
+def test_rejoining_is_a_stage_until_the_next_task(flight: Flight) -> None:
+    begun_ns = flight.tasks_started[0].t_ns + 2 * NS_PER_S
+    rejoining = Event(begun_ns, "rejoining", Severity.INFO, "back to where it was")
+    (stage,) = summarise(replace(flight, events=(rejoining,))).stages
+    assert (stage.name, stage.start_s, stage.end_s) == ("rejoining", 2.0, 6.0)
+
+
+def test_into_a_pipe_nothing_is_cut_or_drawn(timed_out: Flight) -> None:
+    text = printed(summarise(timed_out), width=80, is_terminal=False)
+    lines = text.splitlines()
+    assert any(LONG in line and line.startswith("align") for line in lines), "the row of the task was wrapped"
+    assert any(LONG in line and "land clear" in line for line in lines)
+    assert [line for line in lines if line != line.rstrip()] == []
+    assert "\x1b" not in text
+    assert not set("─━│┃╭╮") & set(text)
+    assert LONG not in printed(summarise(timed_out), width=80)  # in a terminal it is wrapped
+
+
+def test_one_of_a_thing_is_not_spelled_as_many(flight: Flight) -> None:
+    first = replace(flight.reports[0], track=Track.DOUBTFUL)
+    text = printed(summarise(replace(flight, reports=(first,))))
+    assert "of 1 frame, 1 was doubtful" in text
+    assert (counted(1, "task"), counted(0, "task"), counted(2, "task")) == ("1 task", "0 tasks", "2 tasks")
 
 
 def test_trouble_comes_first(flight: Flight) -> None:

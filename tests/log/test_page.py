@@ -75,6 +75,25 @@ def test_the_page_tells_what_was_flown(flight: Flight) -> None:
     assert max(over_m) == pytest.approx(7.0, abs=0.05)  # the conductors hang 9 m up
 
 
+def test_a_page_says_with_units_what_was_flown_with(flight: Flight) -> None:
+    host = {"n_cores": 1, "memory_bytes": 8_000_000_000, "architecture": "aarch64", "computer": "a board"}
+    told = replace(
+        flight,
+        mission=replace(flight.mission, metadata={"wind_m_s": "8", "wind_from_deg": "90", "speed": "2"}),
+        attachments={"host.json": json.dumps(host).encode(), "versions.json": b"no JSON"},
+    )
+    facts = page_data(told, inspect_flight(told))["facts"]
+    assert (facts["wind"], facts["wind from"], facts["speed"]) == ("8 m/s", "90°", "2 times real time")
+    assert (facts["processor"], facts["memory"], facts["computer"]) == ("aarch64, 1 core", "8.0 GB", "a board")
+
+
+def test_what_is_never_late_has_no_distribution(flight: Flight) -> None:
+    punctual = replace(flight, ticks=tuple(replace(tick, late_s=0.0) for tick in flight.ticks))
+    report = inspect_flight(flight)
+    assert "control tick late by" in page_data(flight, report)["histograms"]
+    assert "control tick late by" not in page_data(punctual, report)["histograms"]
+
+
 def test_frames_fit_into_the_budget_and_cover_the_flight(flight: Flight, monkeypatch: pytest.MonkeyPatch) -> None:
     start_ns = flight_start_ns(flight)
     whole = page_frames(flight, start_ns)

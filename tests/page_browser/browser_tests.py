@@ -7,11 +7,15 @@ screenshots.
 import itertools
 import os
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
 
 from mission.autopilot import Setpoint
+from mission.compare.circumstances import circumstances_of
+from mission.compare.comparison import compare_reports
+from mission.compare.page import comparison_page
 from mission.live.feed import LiveFeed
 from mission.live.settings import Briefing, LiveSettings
 from mission.log.inspection import inspect_flight
@@ -19,6 +23,7 @@ from mission.log.page.page import flight_page
 from mission.log.reader import Flight, read_flight
 from mission.operator import Wish
 from mission.plan_file import read_mission
+from mission.records import CheckResult, PreflightCheck, Result
 from mission.simulated.page_ground import page_ground
 from mission.simulated.scenario import Scenario
 from mission.simulated.virtual_flight import fly_virtually
@@ -28,7 +33,7 @@ from tests.page_browser.browser import Browser
 from tests.support.command_line import ROOT, lineflight
 from vision.records import VisionReport
 
-DESKTOP, PHONE = (1440, 1100), (500, 1100)  # the narrowest window that Chromium makes
+DESKTOP, PHONE = (1440, 1100), (390, 1100)
 
 
 @pytest.fixture(scope="module")
@@ -115,9 +120,53 @@ def test_the_plots_have_their_traces(browser: Browser, page: Path, flight: Fligh
     )
     assert points > 10
     bars = browser.evaluate("document.querySelectorAll('#histograms .plot').length")
-    assert bars >= 4
-    assert browser.evaluate("document.querySelectorAll('#tasks .task').length") == len(tasks)
+    assert bars == 2  # vision's latency, and the time between frames: nothing else takes time in virtual time
+    assert browser.evaluate("document.querySelectorAll('#tasks .task:not(.stage-out)').length") == len(tasks)
+    empty = (
+        "[...document.querySelectorAll('.card, .grid')].filter((c) => c.offsetHeight && !c.textContent.trim()).length"
+    )
+    assert browser.evaluate(empty) == 0, "a section stands there empty"
     keep(browser, f"page-{browser.evaluate('innerWidth')}")
+
+
+def test_the_legend_names_what_the_map_shows_and_hides_it(browser: Browser, page: Path, flight: Flight) -> None:
+    browser.open(page)
+    entries = browser.evaluate("[...document.querySelectorAll('#maplegend button')].map((b) => b.textContent)")
+    marks = {"conductors of the line, true", "supports", "the line as known in flight", "setpoints", "camera frames"}
+    tasks = {started.task.replace("_", " ") for started in flight.tasks_started}
+    assert marks | {"take-off", "landing"} | tasks <= set(entries)
+    assert len(entries) == len(set(entries))
+    shown = "document.getElementById('map').data.find((trace) => trace.name === '{}').visible !== false"
+    for name, button, before in (("supports", "supports", True), ("frames", "camera frames", False)):
+        assert browser.evaluate(shown.format(name)) == before
+        browser.evaluate(
+            f"[...document.querySelectorAll('#maplegend button')].find((b) => b.textContent === '{button}').click()"
+        )
+        browser.wait_for(f"({shown.format(name)}) === {str(not before).lower()}")
+
+
+def test_the_way_down_has_a_name_and_trouble_is_shown_first(browser: Browser, flight: Flight, tmp_path: Path) -> None:
+    """The same flight, as if its second leg had timed out and what came after it were the way down."""
+    legs = [k for k, started in enumerate(flight.tasks_started) if started.task == "follow_lines"]
+    last = legs[-1]
+    ended = replace(flight.tasks_ended[last], result=Result.TIMED_OUT, reason="the task took longer than 10 s")
+    failed = replace(
+        flight,
+        tasks_started=flight.tasks_started[: last + 1],
+        tasks_ended=(*flight.tasks_ended[:last], ended),
+        mission_ended=replace(flight.mission_ended, result=Result.TIMED_OUT, reason="the task took longer than 10 s"),
+    )
+    path = tmp_path / "failed.html"
+    path.write_text(flight_page(failed, replace(inspect_flight(failed), excursions=()), None))
+    browser.open(path)
+    assert browser.evaluate("document.getElementById('result').textContent") == "timed out in follow lines"
+    assert browser.evaluate("document.querySelector('.stage-out').textContent") == "going down"
+    end_s = (ended.t_ns - flight.tasks_started[0].t_ns) / 1e9
+    assert browser.evaluate("lineflight.now") == pytest.approx(end_s, abs=0.01)
+    browser.evaluate(f"lineflight.setTime({end_s + 5.0})")
+    assert browser.evaluate("document.getElementById('now').textContent").startswith("task going down")
+    assert browser.evaluate("document.getElementById('begun').textContent").endswith("times from take-off")
+    keep(browser, f"failed-{browser.evaluate('innerWidth')}")
 
 
 def test_the_slider_moves_everything(browser: Browser, page: Path, flight: Flight) -> None:
@@ -161,7 +210,31 @@ def test_the_comparison_page_is_whole(browser: Browser, log: Path, tmp_path: Pat
     assert (
         browser.evaluate("document.getElementById('map').data.filter((t) => t.name.startsWith('follow')).length") == 2
     )
+    told = browser.evaluate("document.getElementById('flights').textContent")
+    assert "The same for all: " in told
+    figures = browser.evaluate("[...document.querySelectorAll('#figures td:nth-child(2)')].map((c) => c.textContent)")
+    assert [figure for figure in figures if "." in figure and not figure[-1].isalpha() and figure[-1] not in "°%"] == []
+    assert [figure for figure in figures if figure.endswith(".00")] == [], "a count is whole"
+    assert browser.evaluate("document.documentElement.scrollWidth <= innerWidth"), "it is wider than the window"
     keep(browser, f"compared-{browser.evaluate('innerWidth')}")
+
+
+def test_a_comparison_says_first_what_differs(browser: Browser, flight: Flight, tmp_path: Path) -> None:
+    told = flight.mission.metadata
+    other = replace(flight, mission=replace(flight.mission, metadata=told | {"wind_m_s": "3", "world": "hills"}))
+    reports = [inspect_flight(one) for one in (flight, other)]
+    page = tmp_path / "compared.html"
+    comparison = compare_reports(["a", "b"], reports, circumstances_of([flight, other]))
+    page.write_text(comparison_page(comparison, [flight, other]))
+    browser.open(page)
+    rows = browser.evaluate(
+        "[...document.querySelectorAll('#flights tr')].slice(1).map((r) => [...r.cells].map((c) => c.textContent))"
+    )
+    assert rows == [["world", "medium_voltage", "hills"], ["wind", "8 m/s", "3 m/s"]]
+    assert browser.evaluate(
+        "document.getElementById('flights').getBoundingClientRect().bottom"
+        " < document.getElementById('figures').getBoundingClientRect().top"
+    )
 
 
 def test_it_is_dark_where_people_want_it_dark(page: Path) -> None:
@@ -195,3 +268,19 @@ def test_the_live_page_shows_the_flight_and_passes_on_a_confirmed_wish(browser: 
         assert until(feed.wishes) == [Wish.HOLD]
     assert [error for error in browser.page.errors if "ERR_" not in error] == []
     assert all(url.startswith((feed.url.split("#")[0], "data:", "blob:")) for url in browser.page.requests)
+
+
+def test_the_live_page_without_a_token_says_why_it_has_no_buttons(browser: Browser) -> None:
+    with LiveFeed(LiveSettings(port=0, foxglove_port=0)) as feed:
+        feed.record(Briefing("follow_line", ("takeoff", "follow_lines")))
+        checks = [PreflightCheck(0, f"check_{k}", CheckResult.OK, "a reason of some length, " * 4) for k in range(20)]
+        for check in checks:
+            feed.record(check)
+        browser.go(feed.url.partition("#")[0])
+        browser.wait_for("document.querySelectorAll('#checks li').length === 20")
+        assert browser.evaluate("document.getElementById('said').textContent").startswith("Without Hold and Land")
+        assert not browser.evaluate("document.getElementById('hold').checkVisibility()")
+        assert browser.evaluate("document.getElementById('clock').textContent") == "before take-off"
+        browser.evaluate("document.getElementById('checkbox').open = true")
+        assert browser.evaluate("document.documentElement.scrollWidth <= innerWidth"), "it is wider than the window"
+        keep(browser, f"live-no-token-{browser.evaluate('innerWidth')}")

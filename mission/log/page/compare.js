@@ -7,7 +7,8 @@
   const words = (name) => name.replaceAll("_", " ");
   const PAINTS = ["ink", "accent", "executive", "autopilot", "wind", "perception"].map(color);
   const paint = (k) => PAINTS[k % PAINTS.length];
-  const number = (v) => (v === null ? "–" : Math.abs(v) >= 100 ? v.toFixed(0) : v.toPrecision(3));
+  const took = (v) => (v === null ? "–" : `${v.toFixed(1)} s`);
+  const TONES = { completed: "ok", failed: "failed", unfinished: "failed" };
 
   function make(tag, text, name) {
     const element = document.createElement(tag);
@@ -16,19 +17,31 @@
     return element;
   }
 
-  function table(id, title, head, rows) {
-    const body = make("table");
-    const first = make("tr");
-    head.forEach((cell, k) => first.append(make("th", cell, k ? "num" : "")));
+  function swatch(k) {
+    const mark = make("i", undefined, "swatch");
+    mark.style.background = paint(k);
+    return mark;
+  }
+
+  /** A table; `numbers` says from which column on cells are numbers, at the right. */
+  function table(place, head, rows, numbers = 1) {
+    const body = make("table"), first = make("tr");
+    head.forEach((cell, k) => {
+      const one = make("th", typeof cell === "string" ? cell : undefined, k >= numbers ? "num" : "");
+      if (typeof cell !== "string") one.append(...cell);
+      first.append(one);
+    });
     body.append(first);
     for (const row of rows) {
       const line = make("tr");
-      row.forEach((cell, k) => line.append(make("td", cell, k ? "num" : "")));
+      row.forEach((cell, k) => line.append(make("td", cell, k >= numbers ? "num" : "")));
       body.append(line);
     }
-    $(id).append(make("h2", title), body);
+    place.append(body);
   }
 
+  const number = (k) => [swatch(k), String(k + 1)];
+  const numbered = () => data.names.map((_, k) => number(k));
   const axis = (more) => ({ gridcolor: color("grid"), zerolinecolor: color("grid"), automargin: true, ...more });
   const layout = (more) => ({
     paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", font: { color: color("ink"), size: 12, family: "system-ui, sans-serif" },
@@ -36,21 +49,49 @@
   });
   const CONFIG = { displaylogo: false, responsive: true, displayModeBar: false };
 
-  data.names.forEach((name, k) => {
-    const swatch = make("i");
-    swatch.style.cssText = `display:inline-block;width:16px;height:4px;margin:0 6px 3px ${k ? 18 : 0}px;background:${paint(k)}`;
-    $("legend").append(swatch, `${name} (${words(data.results[k])})`);
-  });
+  function flights() {
+    const list = make("ol", undefined, "flights");
+    data.names.forEach((name, k) => {
+      const item = make("li");
+      item.append(swatch(k), make("b", String(k + 1)), make("span", name), make("span", data.headlines[k], TONES[data.results[k]] ?? "warning"), make("span", data.reasons[k], "dim"));
+      list.append(item);
+    });
+    $("flights").append(list);
+    if (data.differing.length) {
+      $("flights").append(make("h2", "What they were flown with differs"));
+      table($("flights"), ["", ...numbered()], data.differing, Infinity);
+      if (data.n_not_shown) $("flights").append(make("p", `${data.n_not_shown} more differ: compare --json tells them all.`, "dim"));
+    }
+    if (data.alike.length) $("flights").append(make("p", `${data.differing.length ? "Otherwise the" : "The"} same for all: ${data.alike.join(", ")}.`, "dim"));
+  }
+
+  flights();
   const changes = data.names.slice(1).map((_, k) => (data.names.length === 2 ? "change" : `change ${k + 2}`));
-  table("figures", "Figures", ["", ...data.names.map((_, k) => String(k + 1)), ...changes],
-    Object.entries(data.figures).filter(([, values]) => values.some((v) => v !== null)).map(([name, values]) => [words(name), ...values.map(number), ...data.changes[name].map((v) => (v > 0 ? "+" : "") + number(v))]));
-  table("tasktable", "Tasks", ["", "1 took [s]", "other took [s]", "1", "other"],
-    data.tasks.flat().map((task) => [words(task.task), ...task.took_s.map(number), ...task.results.map((r) => (r === null ? "not flown" : words(r)))]));
+  $("figures").append(make("h2", "Figures"));
+  table($("figures"), ["", ...numbered(), ...changes], data.figure_rows);
+  data.tasks.forEach((pairs, other) => {
+    $("tasktable").append(make("h2", data.tasks.length > 1 ? `Tasks: 1 and ${other + 2}` : "Tasks"));
+    table($("tasktable"), ["", number(0), number(other + 1), "1 took", `${other + 2} took`],
+      pairs.map((task) => [words(task.task), ...task.results.map((r) => (r === null ? "not flown" : words(r))), ...task.took_s.map(took)]), 3);
+  });
+  const legend = (name, style) => {
+    const entry = make("span"), mark = make("i");
+    mark.style.cssText = style;
+    entry.append(mark, name);
+    $("maplegend").append(entry);
+  };
 
   addEventListener("DOMContentLoaded", () => requestAnimationFrame(() => setTimeout(() => {
     document.head.append(make("script", $("plotly").textContent));
     const traces = [];
-    for (const conductor of data.conductors) traces.push({ type: "scatter", mode: "lines", hoverinfo: "skip", name: "conductor", x: conductor.map((p) => p[1]), y: conductor.map((p) => p[0]), line: { color: color("line"), width: 1 } });
+    data.lines.forEach(({ flights: these, conductors, supports }) => {
+      const isShared = data.lines.length === 1, hue = isShared ? color("line") : paint(these[0]), whose = isShared ? "" : ` of ${these.map((k) => k + 1).join(" and ")}`;
+      for (const points of conductors) traces.push({ type: "scatter", mode: "lines", hoverinfo: "skip", name: "conductor", x: points.map((p) => p[1]), y: points.map((p) => p[0]), opacity: isShared ? 1 : 0.5, line: { color: hue, width: 1 } });
+      traces.push({ type: "scatter", mode: "markers", hoverinfo: "skip", name: "supports", x: supports.map((p) => p[1]), y: supports.map((p) => p[0]), marker: { color: hue, size: 7, symbol: "square" } });
+      legend(`conductors${whose}`, `height:2px;background:${hue}`);
+      legend(`supports${whose}`, `width:8px;height:8px;background:${hue}`);
+    });
+    data.names.forEach((_, k) => legend(`flight ${k + 1}`, `height:4px;background:${paint(k)}`));
     const box = [Infinity, -Infinity, Infinity, -Infinity];
     data.tracks.forEach((track, k) => {
       traces.push({ type: "scatter", mode: "lines", name: data.names[k], hoverinfo: "name", x: track.east, y: track.north, line: { color: paint(k), width: 2 } });
@@ -65,7 +106,9 @@
     const draws = [];
     for (const leg of data.legs) {
       const card = make("div", undefined, "card chart"), plot = make("div", undefined, "plot");
-      card.append(make("h2", `${leg.title} [m]`), plot);
+      const title = make("h2", `${leg.title} [m]`);
+      for (const curve of leg.curves) { const of = make("span", undefined, "key"); of.append(swatch(curve.flight), String(curve.flight + 1)); title.append(of); }
+      card.append(title, plot);
       $("charts").append(card);
       draws.push(() => Plotly.newPlot(plot, leg.curves.map((curve) => ({ type: "scatter", mode: "lines", name: data.names[curve.flight], x: curve.t, y: curve.y, line: { color: paint(curve.flight), width: 1.5 } })),
         layout({ xaxis: axis({ ticksuffix: " s" }), yaxis: axis({}), hovermode: "x" }), CONFIG));

@@ -1,7 +1,5 @@
 """A flight as the page's script wants it: plain lists, times in seconds from the first task, degrees for people."""
 
-import json
-import math
 from datetime import UTC, datetime
 from typing import Any
 
@@ -10,10 +8,12 @@ from numpy.typing import NDArray
 
 from drivers.clock import NS_PER_S
 from mission.log.blame.signals import Motion, motion_of
+from mission.log.circumstances import flown_with
 from mission.log.page.curves import flight_curves, listed
 from mission.log.page.thinning import evenly
 from mission.log.reader import Flight
 from mission.log.summary import FlightReport, flight_start_ns, to_json
+from mission.log.wording import counted
 from mission.records import LineFix
 
 Floats = NDArray[np.float64]
@@ -21,6 +21,7 @@ Floats = NDArray[np.float64]
 _TRACK_POINTS = 2_500
 _FIX_POINTS = 900
 _BINS = 40
+_NO_TIME_MS = 0.01
 
 
 def page_data(flight: Flight, report: FlightReport) -> dict[str, Any]:
@@ -32,6 +33,8 @@ def page_data(flight: Flight, report: FlightReport) -> dict[str, Any]:
         "name": flight.mission.name,
         "log": flight.path.name,
         "begun": begun.strftime("%Y-%m-%d %H:%M UTC"),
+        "headline": report.headline,
+        "times_since": report.times_since,
         "report": to_json(report),
         "track": _track(flight, motion, start_ns),
         "truth": _truth(flight, start_ns),
@@ -143,6 +146,8 @@ def _histograms(flight: Flight) -> dict[str, Any]:
     for name, values in named.items():
         if len(values) >= 2:
             array = np.array(values)
+            if array.max() < _NO_TIME_MS:  # nothing is ever late in virtual time: there is nothing to show
+                continue
             high = float(np.percentile(array, 99.5)) * 1.05 + 1e-3
             counts, edges = np.histogram(np.clip(array, 0.0, high), bins=_BINS, range=(0.0, high))
             found[name] = {
@@ -156,14 +161,8 @@ def _histograms(flight: Flight) -> dict[str, Any]:
 
 
 def _facts(flight: Flight) -> dict[str, str]:
-    """What was flown with, as the log's metadata and attachments say."""
-    facts = {key.replace("_", " "): value for key, value in flight.mission.metadata.items() if "\n" not in value}
-    facts["mission file"] = f"sha256 {flight.mission.sha256[:12]}"
-    if flight.origin is not None:
-        latitude, longitude = math.degrees(flight.origin.latitude_rad), math.degrees(flight.origin.longitude_rad)
-        facts["origin"] = f"{latitude:.6f}, {longitude:.6f}, {flight.origin.altitude_m:.0f} m"
-    for name in ("versions.json", "host.json"):
-        facts |= _attached(flight, name)
+    """What was flown with, and how the log itself did."""
+    facts = flown_with(flight)
     if flight.imported is not None:
         own = flight.imported.log
         facts["the autopilot's own log"] = (
@@ -172,12 +171,6 @@ def _facts(flight: Flight) -> dict[str, str]:
         )
     if flight.health:
         last = flight.health[-1]
-        facts["log"] = (
-            f"{last.n_bytes / 1e6:.1f} MB, {last.n_dropped_images} images dropped, {last.work_s:.1f} s of work"
-        )
+        dropped = counted(last.n_dropped_images, "image")
+        facts["log"] = f"{last.n_bytes / 1e6:.1f} MB, {dropped} dropped, {last.work_s:.1f} s of work"
     return facts
-
-
-def _attached(flight: Flight, name: str) -> dict[str, str]:
-    text = flight.attachments.get(name)
-    return {} if text is None else {str(key): str(value) for key, value in json.loads(text).items()}

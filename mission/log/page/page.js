@@ -13,6 +13,8 @@
   const CULPRITS = ["perception", "executive", "autopilot", "wind"];
   const T0 = Math.min(0, flight.track.t[0] ?? 0);
   const T1 = Math.max(report.duration_s, flight.track.t.at(-1) ?? 0);
+  /** What was flown outside the tasks, and the time before the first of them. */
+  const STAGES = [...(T0 < -0.5 ? [{ name: `before ${flight.times_since}`, start_s: T0, end_s: 0 }] : []), ...report.stages.filter((stage) => stage.start_s >= 0)];
   let now = 0;
   let playing = null;
 
@@ -48,30 +50,33 @@
     const sign = t < 0 ? "-" : "", all = Math.abs(t);
     return `${sign}${Math.floor(all / 60)}:${(all % 60).toFixed(1).padStart(4, "0")}`;
   };
-  const fixed = (value, digits, unit) => (value === null || value === undefined ? "–" : value.toFixed(digits) + unit);
+  const fixed = (value, digits, unit) => (value === null || value === undefined ? "–" : (value.toFixed(digits).replace(/^-(?=[0.]*$)/, "") + unit));
+  const counted = (n, noun) => `${n} ${noun}${n === 1 ? "" : "s"}`;
+  const withUnit = (value, unit) => (unit === "deg" ? fixed(value, value < 10 ? 1 : 0, "°") : fixed(value, 2, ` ${unit}`));
 
   // -- heading and blame -------------------------------------------------------------------------------------------
 
   function heading() {
     $("name").textContent = flight.name;
-    const tone = { completed: "good", failed: "bad", unfinished: "bad" }[report.result] ?? "warn";
-    $("result").textContent = words(report.result);
+    const isHurt = report.events.some((event) => event.severity === "error"); // it may have fallen over after a mission that it completed
+    const tone = { completed: isHurt ? "warn" : "good", failed: "bad", unfinished: "bad" }[report.result] ?? "warn";
+    $("result").textContent = flight.headline;
     $("result").classList.add(tone);
     $("reason").textContent = report.reason;
     $("damage").textContent = report.damage ?? "";
     $("damage").hidden = !report.damage;
-    $("begun").textContent = `${flight.begun} · ${clock(report.duration_s)} · ${report.tasks.length} tasks`;
+    $("begun").textContent = `${flight.begun} · ${counted(report.tasks.length, "task")} · ${clock(report.duration_s)} min · times from ${flight.times_since}`;
     $("log").textContent = flight.log;
     $("mission").textContent = flight.mission_text;
     const tiles = [];
     if (report.lateral) {
-      tiles.push([`${report.lateral.mean_m.toFixed(2)} m`, "mean distance from the line"]);
-      tiles.push([`${report.lateral.p95_m.toFixed(2)} m`, "p95 distance from it"]);
-    } else if (report.legs.length) tiles.push([`${report.legs[0].avg_error_m.toFixed(2)} m`, "from a straight line"]);
-    if (report.yaw_error) tiles.push([`${report.yaw_error.median_deg.toFixed(1)}°`, "median heading error"]);
-    if (report.vision.latency_ms) tiles.push([`${report.vision.latency_ms.p50.toFixed(0)} ms`, "frame to estimate"]);
+      tiles.push([`${report.lateral.mean_m.toFixed(2)} m`, "from the true line, mean"]);
+      tiles.push([`${report.lateral.p95_m.toFixed(2)} m`, "from the true line, p95"]);
+    } else if (report.legs.length) tiles.push([`${report.legs[0].avg_error_m.toFixed(2)} m`, "off straight, mean of leg 1"]);
+    if (report.yaw_error) tiles.push([`${report.yaw_error.median_deg.toFixed(1)}°`, "heading error, median"]);
+    if (report.vision.latency_ms) tiles.push([`${report.vision.latency_ms.p50.toFixed(0)} ms`, "frame to estimate, median"]);
     if (report.landing) {
-      const where = report.is_truncated ? "from the start, where the log ends" : report.landing.is_disarmed ? "landed from the start" : "from the start, still armed";
+      const where = report.is_truncated ? "from the start, where the log ends" : report.landing.is_disarmed ? (report.result === "completed" && !isHurt ? "landed from the start" : "from the start, at the end") : "from the start, still armed";
       tiles.push([`${report.landing.distance_m.toFixed(2)} m`, where]);
     }
     for (const [figure, what] of tiles) $("tiles").append(make("div", { class: "tile" }, make("b", {}, figure), make("span", {}, what)));
@@ -88,13 +93,13 @@
       const shares = total ? make("div", { class: "shares", "aria-hidden": "true" }, ...Object.entries(trouble.shares)
         .filter(([, value]) => value > 0)
         .map(([who, value]) => {
-          const part = make("i", { title: `${who} ${value.toFixed(2)} m` });
+          const part = make("i", { title: `${who} ${withUnit(value, trouble.unit)}` });
           part.style.flex = value / total;
           part.style.background = color(who === "tracking" ? trouble.culprit === "wind" ? "wind" : "autopilot" : who);
           return part;
         })) : null;
       $("blame").append(make("button", { type: "button", class: `card fault ${trouble.culprit}`, onclick: () => setTime(trouble.start_s) },
-        make("h2", {}, `${KINDS[trouble.kind] ?? words(trouble.kind)}, ${trouble.peak.toFixed(2)} ${trouble.unit}`,
+        make("h2", {}, `${KINDS[trouble.kind] ?? words(trouble.kind)}, ${withUnit(trouble.peak, trouble.unit)}`,
           make("span", { class: "who" }, `${trouble.culprit} · ${trouble.fault}`),
           make("span", { class: "dim" }, `${clock(trouble.start_s)} to ${clock(trouble.end_s)}`)),
         shares,
@@ -118,6 +123,20 @@
       box.style.background = TASKS[task.task] ?? "#e5e7eb";
       $("tasks").append(box);
     }
+    for (const stage of STAGES) {
+      const box = make("div", { class: "task stage-out", title: `${stage.name}: outside the mission's tasks` }, make("b", {}, stage.name));
+      box.style.left = share(stage.start_s);
+      box.style.width = share(T0 + stage.end_s - stage.start_s);
+      $("tasks").append(box);
+    }
+    const boxes = [...$("tasks").children];
+    const fit = () => { // a name that is cut off says less than none
+      for (const box of boxes) box.classList.remove("tight");
+      const tight = boxes.filter((box) => box.scrollWidth > box.clientWidth);
+      for (const box of tight) box.classList.add("tight");
+    };
+    requestAnimationFrame(fit);
+    addEventListener("resize", fit);
     for (const trouble of report.excursions) {
       const mark = make("div", { class: "mark", title: `${words(trouble.kind)}: ${trouble.culprit}` });
       mark.style.left = share(trouble.start_s);
@@ -200,9 +219,10 @@
 
   function showNow() {
     const task = report.tasks.findLast((one) => one.start_s <= now && (one.end_s === null || now <= one.end_s));
+    const stage = STAGES.findLast((one) => one.start_s <= now && now <= one.end_s && !(task && task.start_s > one.start_s));
     const k = Math.max(0, indexAt(flight.track.t, now));
     const facts = [
-      ["task", task ? words(task.task) : "–"],
+      ["task", stage ? stage.name : task ? words(task.task) : "–"],
       ["mode", flight.track.mode[k] ?? "–"],
       ["height", fixed(valueAt("height"), 1, " m")],
       ["speed", fixed(valueAt("speed"), 1, " m/s")],
@@ -211,7 +231,7 @@
       ["tilt", fixed(valueAt("tilt_deg"), 0, "°")],
       ["battery", fixed(valueAt("battery"), 0, " %")],
     ];
-    $("now").replaceChildren(...facts.map(([what, value]) => make("span", {}, what + " ", make("b", {}, value))));
+    $("now").replaceChildren(...facts.filter(([, value]) => value !== "–").map(([what, value]) => make("span", {}, what + " ", make("b", {}, value))));
   }
 
   function showFrame() {
@@ -239,7 +259,7 @@
     };
     $("lines").replaceChildren(...frame.lines.map((ends) => line(ends, "under")), ...frame.lines.map((ends) => line(ends, "over")));
     const seen = frame.angle_deg === null ? "no line" : `${frame.n_lines} conductor${frame.n_lines === 1 ? "" : "s"} at ${frame.angle_deg.toFixed(1)}°, ${frame.offset_px.toFixed(0)} px aside`;
-    $("caption").textContent = `Frame ${k + 1} of ${frameTimes.length} at ${clock(frame.t)}: ${frame.trouble ?? seen}; ${frame.track}, told after ${frame.latency_ms.toFixed(0)} ms`;
+    $("caption").textContent = `Frame ${k + 1} of ${frameTimes.length} at ${clock(frame.t)}: ${frame.trouble ? words(frame.trouble) : seen} (vision ${words(frame.track)}), ${frame.latency_ms.toFixed(0)} ms from capture to estimate`;
   }
 
   // -- plots -------------------------------------------------------------------------------------------------------
@@ -262,6 +282,12 @@
     }
     return found.values();
   };
+  /** The track outside the tasks. */
+  const outside = () => STAGES.filter((stage) => stage.start_s >= 0).map((stage) => {
+    const first = Math.max(0, indexAt(flight.track.t, stage.start_s)), last = indexAt(flight.track.t, stage.end_s) + 2;
+    const cut = (name) => flight.track[name].slice(first, last);
+    return { stage, east: cut("east"), north: cut("north"), up: cut("up"), t: cut("t") };
+  });
   const troubled = () => report.excursions.map((trouble) => {
     const first = Math.max(0, indexAt(flight.track.t, trouble.start_s)), last = indexAt(flight.track.t, trouble.end_s) + 2;
     const cut = (name) => flight.track[name].slice(first, last);
@@ -285,17 +311,29 @@
     const box = bounds();
     const traces = [];
     const push = (trace) => traces.push({ type: "scatter", mode: "lines", hoverinfo: "skip", ...trace });
+    const frames = () => {
+      const places = frameTimes.map((t) => nearest(flight.track.t, t)).filter((k) => k >= 0);
+      return { t: frameTimes, east: places.map((k) => flight.track.east[k]), north: places.map((k) => flight.track.north[k]) };
+    };
     if (flight.line) {
-      for (const conductor of flight.line.conductors) push({ name: "conductor", x: conductor.map((p) => p[1]), y: conductor.map((p) => p[0]), line: { color: color("line"), width: 1 } });
+      for (const conductor of flight.line.conductors) push({ name: "conductor", x: conductor.map((p) => p[1]), y: conductor.map((p) => p[0]), line: { color: color("wire"), width: 1.2 } });
       const poles = near(flight.line.supports, box);
-      push({ name: "supports", mode: "markers", x: poles.map((p) => p[1]), y: poles.map((p) => p[0]), marker: { color: color("ink"), size: 7, symbol: "square" } });
+      push({ name: "supports", mode: "markers", x: poles.map((p) => p[1]), y: poles.map((p) => p[0]), marker: { color: color("ink"), size: 9, symbol: "square", line: { color: color("card"), width: 1.5 } } });
     }
-    if (flight.fixes.t.length) push({ name: "line as known", mode: "markers", x: flight.fixes.east, y: flight.fixes.north, marker: { color: color("line"), size: 3, opacity: 0.55 } });
-    push({ name: "setpoint", x: flight.track.setpoint_east, y: flight.track.setpoint_north, line: { color: color("setpoint"), width: 1, dash: "dot" } });
+    if (flight.fixes.t.length) push({ name: "line as known", mode: "markers", x: flight.fixes.east, y: flight.fixes.north, marker: { color: color("known"), size: 4, opacity: 0.7 } });
+    push({ name: "setpoint", x: flight.track.setpoint_east, y: flight.track.setpoint_north, line: { color: color("ink"), width: 1.5, dash: "dot" } });
     if (flight.truth) push({ name: "true way", x: flight.truth.east, y: flight.truth.north, line: { color: color("truth"), width: 1.2 } });
     if (flight.imported) push({ name: "the autopilot's own log", x: flight.imported.east, y: flight.imported.north, line: { color: color("executive"), width: 1.2, dash: "dash" } });
     for (const piece of pieces()) push({ name: words(piece.task.task), x: piece.east, y: piece.north, text: piece.t.map((t) => (t === null ? "" : clock(t))), hoverinfo: "text+name", customdata: piece.t, line: { color: TASKS[piece.task.task] ?? color("ink"), width: 4 } });
-    for (const { trouble, east, north } of troubled()) push({ name: words(trouble.kind), x: east, y: north, line: { color: color("bad"), width: 6 }, opacity: 0.6 });
+    for (const { stage, east, north, t } of outside()) push({ name: stage.name, x: east, y: north, text: t.map(clock), hoverinfo: "text+name", customdata: t, line: { color: color("outside"), width: 4 } });
+    for (const { trouble, east, north } of troubled()) push({ name: `trouble: ${words(trouble.kind)}`, x: east, y: north, line: { color: color("bad"), width: 6 }, opacity: 0.6 });
+    if (frameTimes.length) {
+      const taken = frames();
+      push({ name: "frames", mode: "markers", visible: false, x: taken.east, y: taken.north, text: taken.t.map((t) => `frame at ${clock(t)}`), hoverinfo: "text", customdata: taken.t, marker: { color: color("card"), size: 5, line: { color: color("ink"), width: 1 } } });
+    }
+    const ends = endPlaces();
+    for (const [name, place, symbol] of ends) push({ name, mode: "markers", x: [place.east], y: [place.north], text: [`${name}, ${clock(place.t)}`], hoverinfo: "text", customdata: [place.t], marker: { color: color("card"), size: 13, symbol, line: { color: color("ink"), width: 3 } } });
+    mapLegend(traces);
     const images = flight.ground ? [{ source: flight.ground.image, xref: "x", yref: "y", x: flight.ground.west_m, y: flight.ground.north_m, sizex: flight.ground.width_m, sizey: flight.ground.height_m, sizing: "stretch", layer: "below", opacity: 0.75 }] : [];
     const drawn = Plotly.newPlot("map", traces, layout({
       xaxis: axis({ title: { text: "east [m]" }, range: [box.w, box.e], zeroline: false, showgrid: !flight.ground }),
@@ -306,6 +344,54 @@
     $("map").on("plotly_relayout", moveArrow);
     $("map").on("plotly_afterplot", moveArrow);
     return drawn;
+  }
+
+  /** Where the way flown begins and ends. */
+  function endPlaces() {
+    const track = flight.track, first = Math.max(0, indexAt(track.t, 0)), last = track.t.length - 1;
+    if (last < 0) return [];
+    const at = (k) => ({ t: track.t[k], east: track.east[k], north: track.north[k] });
+    const end = report.is_truncated || report.result === "unfinished" ? "where the log ends" : report.landing?.is_disarmed ? (report.result === "completed" ? "landing" : "end of the flight") : "end of the flight";
+    const start = flight.times_since === "take-off" ? "take-off" : "start";
+    return [[start, at(first), "circle"], [end, at(last), "square"]];
+  }
+
+  const LEGEND = [
+    ["conductors of the line, true", (name) => name === "conductor", "wire", "height:2px"],
+    ["supports", (name) => name === "supports", "ink", "width:9px;height:9px"],
+    ["the line as known in flight", (name) => name === "line as known", "known", "width:6px;height:6px;border-radius:50%"],
+    ["setpoints", (name) => name === "setpoint", "ink", "", "dash"],
+    ["track, true", (name) => name === "true way", "truth", "height:2px"],
+    ["track by the autopilot's own log", (name) => name === "the autopilot's own log", "executive", "height:2px"],
+    ["went wrong", (name) => name.startsWith("trouble: "), "bad", "height:6px;opacity:.6"],
+    ["camera frames", (name) => name === "frames", "card", "width:7px;height:7px;border-radius:50%;border:1px solid"],
+  ];
+
+  /** What each mark of the map is; a click hides or shows it. */
+  function mapLegend(traces) {
+    const entry = (what, isOf, css, kind = "") => {
+      const members = traces.flatMap((trace, k) => (isOf(trace.name) ? [k] : []));
+      if (!members.length) return null;
+      const mark = make("i", { class: kind });
+      mark.style.cssText = css;
+      const button = make("button", { type: "button", title: "Hide or show it", "aria-pressed": String(traces[members[0]].visible !== false) }, mark, what);
+      button.addEventListener("click", () => {
+        const isShown = button.getAttribute("aria-pressed") !== "true";
+        button.setAttribute("aria-pressed", String(isShown));
+        Plotly.restyle("map", { visible: isShown }, members);
+      });
+      return button;
+    };
+    const tasks = [...new Set(report.tasks.map((task) => task.task))];
+    const stages = [...new Set(STAGES.map((stage) => stage.name))];
+    const entries = [
+      ...LEGEND.map(([what, isOf, paint, css, kind]) => entry(what, isOf, `${css};background:${color(paint)};color:${color(paint === "card" ? "ink" : paint)}`, kind)),
+      ...endPlaces().map(([name, , symbol]) => entry(name, (other) => other === name, "", symbol === "circle" ? "place" : "place end")),
+      make("span", {}, tasks.length ? "track flown:" : ""),
+      ...tasks.map((task) => entry(words(task), (name) => name === words(task), `background:${TASKS[task] ?? color("ink")}`)),
+      ...stages.map((stage) => entry(stage, (name) => name === stage, `background:${color("outside")}`)),
+    ];
+    $("maplegend").replaceChildren(...entries.filter((one) => one !== null && one.textContent));
   }
 
   function moveArrow() {
@@ -334,6 +420,7 @@
     push({ name: "setpoint", x: flight.track.setpoint_east, y: flight.track.setpoint_north, z: flight.track.setpoint_up, line: { color: color("setpoint"), width: 2 } });
     if (flight.truth) push({ name: "true way", x: flight.truth.east, y: flight.truth.north, z: flight.truth.up, line: { color: color("truth"), width: 3 } });
     for (const piece of pieces()) push({ name: words(piece.task.task), x: piece.east, y: piece.north, z: piece.up, line: { color: TASKS[piece.task.task] ?? color("ink"), width: 6 } });
+    for (const { stage, east, north, up } of outside()) push({ name: stage.name, x: east, y: north, z: up, line: { color: color("outside"), width: 6 } });
     cursorTrace = traces.length;
     push({ name: "vehicle", mode: "markers", x: [0], y: [0], z: [0], marker: { color: color("accent"), size: 7, line: { color: color("card"), width: 1 } } });
     const side = (text) => ({ title: { text }, gridcolor: color("grid"), zerolinecolor: color("grid"), color: color("dim"), backgroundcolor: "rgba(0,0,0,0)" });
@@ -360,6 +447,7 @@
       button.addEventListener("click", () => {
         for (const other of document.querySelectorAll(".tabs button")) other.setAttribute("aria-selected", String(other === button));
         $("map").hidden = button.dataset.view !== "map";
+        $("maplegend").hidden = $("map").hidden;
         $("space").hidden = button.dataset.view !== "space";
         if (button.dataset.view === "space" && cursorTrace < 0 && window.Plotly) drawSpace();
         moveArrow();
@@ -374,7 +462,9 @@
     ["The line in the image: angle", "°", [["angle_deg", "angle", "perception", 1.2]]],
     ["The line in the image: offset", "px", [["offset_px", "offset", "perception", 1.2]]],
     ["Setpoint against achieved", "m", [["from_setpoint", "vehicle from its setpoint", "autopilot", 1.4]]],
-    ["Speed and tilt", "m/s, °/10", [["speed", "speed", "ink", 1.6], ["tilt_tenth", "tilt in tens of degrees", "wind", 1.2], ["push", "push of the air [m/s²]", "executive", 1]]],
+    ["Speed over ground", "m/s", [["speed", "speed", "ink", 1.6]]],
+    ["Tilt", "°", [["tilt_deg", "tilt", "wind", 1.4]]],
+    ["Push of the air", "m/s²", [["push", "what the air took from the thrust", "executive", 1.2]]],
     ["Delays", "ms", [["latency_ms", "frame to estimate", "perception", 1], ["telemetry_age_ms", "telemetry's age", "executive", 1], ["tick_late_ms", "control tick late", "bad", 1], ["round_trip_ms", "link there and back", "wind", 1.2]]],
     ["Battery", "%", [["battery", "battery", "good", 1.6]]],
     ["Battery, by the autopilot's own log", "V, A", [["imported_voltage", "voltage", "good", 1.4], ["imported_current", "current", "wind", 1.2]]],
@@ -384,7 +474,7 @@
   let isSyncing = false;
 
   function drawCharts() {
-    if (flight.curves.tilt_deg) flight.curves.tilt_tenth = { t: flight.curves.tilt_deg.t, y: flight.curves.tilt_deg.y.map((v) => (v === null ? null : v / 10)) };
+    for (const name of ["tick_late_ms", "telemetry_age_ms"]) if (flight.curves[name]?.y.every((v) => !v)) delete flight.curves[name]; // virtual time is never late
     const seen = new IntersectionObserver((entries) => {
       for (const entry of entries) if (entry.isIntersecting) { seen.unobserve(entry.target); entry.target.draw(); }
     }, { rootMargin: "300px" });
@@ -392,12 +482,12 @@
       const present = curves.filter(([name]) => flight.curves[name]);
       if (!present.length) continue;
       const plot = make("div", { class: "plot" }), line = make("div", { class: "cursor" });
-      const legend = make("span", { class: "dim" });
-      for (const [, what, paint] of present) {
-        const swatch = make("i"); swatch.style.cssText = `display:inline-block;width:12px;height:3px;margin:0 5px 3px 12px;background:${color(paint)}`;
-        legend.append(swatch, what);
-      }
-      const card = make("div", { class: "card chart" }, make("h2", {}, `${title} [${unit}]`, legend), plot, line);
+      const keys = present.length === 1 ? [] : present.map(([, what, paint]) => {
+        const swatch = make("i");
+        swatch.style.background = color(paint);
+        return make("span", { class: "key" }, swatch, what);
+      });
+      const card = make("div", { class: "card chart" }, make("h2", {}, `${title} [${unit}] `, ...keys), plot, line);
       card.draw = () => {
         Plotly.newPlot(plot, present.map(([name, what, paint, width]) => ({
           name: what, type: "scatter", mode: "lines", x: flight.curves[name].t, y: flight.curves[name].y, connectgaps: false,
@@ -414,9 +504,10 @@
       $("charts").append(card);
       seen.observe(card);
     }
+    const short = (value) => (value >= 10 ? value.toFixed(0) : value.toFixed(1));
     for (const [title, bins] of Object.entries(flight.histograms)) {
       const plot = make("div", { class: "plot" });
-      const card = make("div", { class: "card" }, make("h2", {}, title, make("span", { class: "dim" }, ` p50 ${bins.p50}, p95 ${bins.p95}, most ${bins.max} ms`)), plot);
+      const card = make("div", { class: "card" }, make("h2", {}, title[0].toUpperCase() + title.slice(1), make("span", { class: "dim" }, ` median ${short(bins.p50)}, p95 ${short(bins.p95)}, at most ${short(bins.max)} ms`)), plot);
       card.draw = () => Plotly.newPlot(plot, [{
         type: "bar", x: bins.counts.map((_, k) => (bins.edges_ms[k] + bins.edges_ms[k + 1]) / 2), y: bins.counts, marker: { color: color("executive") },
         hovertemplate: "%{y} times at %{x:.1f} ms<extra></extra>",
@@ -450,10 +541,16 @@
 
   // -- tables ------------------------------------------------------------------------------------------------------
 
+  /** Cells of their own kind: numbers stand at the right, times and names do not break. */
+  const number = (text) => ({ text, kind: "num" });
+  const time = (t) => ({ text: clock(t), kind: "time" });
+  const name = (text) => ({ text, kind: "name" });
+
   function table(id, title, head, rows) {
     if (!rows.length) return;
-    const cell = (tag, value) => (value instanceof Node ? make(tag, {}, value) : make(tag, { class: typeof value === "number" ? "num" : "" }, typeof value === "number" ? String(value) : value ?? ""));
-    $(id).append(make("h2", {}, title), make("table", {}, head.length ? make("tr", {}, ...head.map((h) => make("th", {}, h))) : null, ...rows.map(({ cells, t, tone }) => {
+    const cell = (tag, value) => (value instanceof Node ? make(tag, { class: "name" }, value) : make(tag, { class: value?.kind ?? "" }, value?.text ?? value ?? ""));
+    if (title) $(id).append(make("h2", {}, title));
+    $(id).append(make("table", {}, head.length ? make("tr", {}, ...head.map((h, k) => make("th", { class: rows[0].cells[k]?.kind ?? "" }, h))) : null, ...rows.map(({ cells, t, tone }) => {
       const row = make("tr", { ...(t === undefined ? {} : { "data-t": t, onclick: () => setTime(t) }), class: tone ?? "" });
       row.append(...cells.map((value) => cell("td", value)));
       return row;
@@ -461,28 +558,31 @@
   }
 
   function tables() {
-    const round = (v) => Number(v.toFixed(3));
-    if (report.legs.length) {
-      table("legs", "Straightness [m] (Cerón, table 6.2: distances from the line that fits each leg best)", ["Leg", ...report.legs.map((_, k) => String(k + 1))], [
-        { cells: ["Average error", ...report.legs.map((leg) => round(leg.avg_error_m))] },
-        { cells: ["95 %", ...report.legs.map((leg) => round(leg.p95_error_m))] },
-        { cells: ["Points", ...report.legs.map((leg) => leg.n_points)] },
-      ]);
-      if (report.lateral) $("legs").append(make("p", { class: "dim" }, `True distance from the line: ${report.lateral.mean_m.toFixed(2)} m mean, ${report.lateral.p95_m.toFixed(2)} m p95, ${report.lateral.max_m.toFixed(2)} m at most.`));
+    if (report.legs.length || report.lateral) {
+      const line = (text) => make("p", { class: "dim" }, text);
+      $("legs").append(make("h2", {}, "How well the line was followed"));
+      if (report.lateral) {
+        $("legs").append(make("h3", {}, "From the true line"), line("How far the vehicle was sideways from where the line really is, which only a simulated flight knows."));
+        table("legs", null, ["", "mean", "p95", "at most"], [{ cells: ["while following", ...["mean_m", "p95_m", "max_m"].map((name) => number(fixed(report.lateral[name], 2, " m")))] }]);
+      }
+      if (report.legs.length) {
+        $("legs").append(make("h3", {}, "Straightness"), line("How far the positions of a leg are from the straight line that fits them best, wherever the power line is (Cerón, equations 6.3 to 6.5, table 6.2): how steadily it flew, not how near."));
+        table("legs", null, ["", "mean", "p95", "positions"], report.legs.map((leg, k) => ({ cells: [`leg ${k + 1}`, number(fixed(leg.avg_error_m, 3, " m")), number(fixed(leg.p95_error_m, 3, " m")), number(String(leg.n_points))] })));
+      }
     }
-    table("tasktable", "Tasks", ["Task", "from", "took", "result"], report.tasks.map((task) => ({
-      cells: [words(task.task), clock(task.start_s), task.end_s === null ? "" : `${(task.end_s - task.start_s).toFixed(1)} s`, `${words(task.result)}: ${task.reason}`], t: task.start_s,
+    table("tasktable", "Tasks", ["task", "from", "took", "result"], report.tasks.map((task) => ({
+      cells: [name(words(task.task)), time(task.start_s), number(task.end_s === null ? "" : `${(task.end_s - task.start_s).toFixed(1)} s`), `${words(task.result)}: ${task.reason}`], t: task.start_s, tone: { failed: "error", timed_out: "error" }[task.result],
     })));
     table("events", "Events", ["at", "event", "what happened"], report.events.map((event) => ({
-      cells: [clock(event.t_s), make("span", { class: event.severity }, words(event.name)), event.message + (event.reaction === "continue" ? "" : ` → ${words(event.reaction)}`)], t: event.t_s,
+      cells: [time(event.t_s), make("span", { class: event.severity }, words(event.name)), event.message + (event.reaction === "continue" ? "" : ` → ${words(event.reaction)}`)], t: event.t_s,
     })));
-    table("preflight", `Pre-flight: ${report.preflight.n_checks} checks`, [], [
+    table("preflight", `Pre-flight: ${counted(report.preflight.n_checks, "check")}`, [], [
       ...report.preflight.failures.map((line) => ({ cells: [make("span", { class: "failed" }, "failed"), line] })),
       ...report.preflight.warnings.map((line) => ({ cells: [make("span", { class: "warning" }, "warning"), line] })),
       ...(report.preflight.failures.length + report.preflight.warnings.length || !report.preflight.n_checks ? [] : [{ cells: [make("span", { class: "ok" }, "all passed")] }]),
     ]);
-    table("texts", "The autopilot's own words", [], flight.texts.map(([t, text]) => ({ cells: [clock(t), text], t })));
-    table("facts", "Flown with", [], Object.entries(flight.facts).map(([key, value]) => ({ cells: [make("span", { class: "dim" }, key), value] })));
+    table("texts", "The autopilot's own words", [], flight.texts.map(([t, text]) => ({ cells: [time(t), text], t })));
+    table("facts", "Flown with", [], Object.entries(flight.facts).map(([key, value]) => ({ cells: [{ text: key, kind: "dim fact" }, value] })));
   }
 
   heading();
@@ -490,7 +590,9 @@
   timeline();
   tables();
   tabs();
-  setTime(report.tasks.find((task) => task.task === "follow_lines")?.start_s ?? 0);
+  // What people ask for first: where it went wrong, else where the line is reached.
+  const failed = report.tasks.find((task) => task.result !== "completed" && task.end_s !== null);
+  setTime(report.excursions[0]?.start_s ?? failed?.end_s ?? report.tasks.find((task) => task.task === "follow_lines")?.start_s ?? 0);
   performance.mark("usable");
   // The plots' library takes a second to be read: what needs no plot is there before it.
   addEventListener("DOMContentLoaded", () => requestAnimationFrame(() => setTimeout(() => {

@@ -1,0 +1,54 @@
+"""A comparison's figures in words for people: what each is called, and its value with its unit. Pure."""
+
+import re
+
+_LABELS = {
+    "duration_s": "duration",
+    "lateral_mean_m": "off the true line, mean",
+    "lateral_p95_m": "off the true line, p95",
+    "lateral_max_m": "off the true line, at most",
+    "yaw_error_median_deg": "true heading error, median",
+    "yaw_error_p95_deg": "true heading error, p95",
+    "frames": "frames",
+    "estimates_share": "frames with a line",
+    "doubtful_frames": "doubtful frames",
+    "latency_p50_ms": "vision latency, median",
+    "latency_p95_ms": "vision latency, p95",
+    "latency_p99_ms": "vision latency, p99",
+    "setpoint_rate_hz": "setpoints",
+    "setpoint_gap_max_ms": "longest gap between setpoints",
+    "landing_distance_m": "end from the start",
+    "events": "events",
+    "excursions": "excursions",
+}
+_STRAIGHTNESS = re.compile(r"leg_(\d+)_straightness_(mean|p95)_m")
+_UNITS = {"_ms": ("ms", 1, 1.0), "_hz": ("Hz", 1, 1.0), "_deg": ("°", 2, 1.0), "_share": ("%", 1, 100.0)}
+_UNITS |= {"_m": ("m", 3, 1.0), "_s": ("s", 1, 1.0)}  # after those that end alike
+UNKNOWN = "-"
+
+
+def label_of(name: str) -> str:
+    """What a figure is called."""
+    leg = _STRAIGHTNESS.fullmatch(name)
+    return f"leg {leg[1]}, how straight, {leg[2]}" if leg else _LABELS.get(name, name.replace("_", " "))
+
+
+def value_words(name: str, value: float | None) -> str:
+    """A figure's value with its unit, as 0.120 m; what has none is a count, and whole."""
+    return UNKNOWN if value is None else _spelled(name, value, "")
+
+
+def change_words(name: str, change: float | None) -> str:
+    """A change with its sign and unit; what is too small to be shown is no change."""
+    if change is None:
+        return UNKNOWN
+    return (
+        "same"
+        if not any(digit in "123456789" for digit in _spelled(name, change, "+"))
+        else _spelled(name, change, "+")
+    )
+
+
+def _spelled(name: str, value: float, sign: str) -> str:
+    unit, digits, factor = next((spell for end, spell in _UNITS.items() if name.endswith(end)), ("", 0, 1.0))
+    return f"{value * factor:{sign}.{digits}f}" + ("" if not unit else unit if unit == "°" else f" {unit}")
