@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.clock import NS_PER_S
+from mission.log.blame.jump import jump_before, jump_words
 from mission.log.blame.leg import Leg
 from mission.log.blame.perception import lag_words, lateness, of_perception, of_unseen
 from mission.log.blame.records import Culprit, Excursion, Fault, Kind, Limits
@@ -45,6 +46,10 @@ def off_line(leg: Leg, limits: Limits) -> Iterator[Excursion]:
             culprit, fault, evidence = _of_executive(leg, start_ns, end_ns, shares["executive"])
         else:
             culprit, fault, evidence = of_tracking(leg.motion, lateral, peak, side)
+        if culprit in (Culprit.EXECUTIVE, Culprit.AUTOPILOT):
+            jump = jump_before(leg, start_ns, peak, float(abs(off_m[peak])))
+            if jump is not None:
+                culprit, fault, evidence = Culprit.PERCEPTION, Fault.WRONG, jump_words(jump)
         words = "right" if side > 0 else "left"
         as_known = "" if lateral.is_true else " as it was known"
         parts = {

@@ -115,7 +115,8 @@ class Lateral:
     `perception_m`, by which the line was elsewhere than told, `executive_m`, by which the setpoint was off the line as
     told, and `tracking_m`, by which the vehicle was off its setpoint. NaN where nothing was told yet. `age_s` is how
     old the newest place of the line was. `aside_m` is the way from the line as it lies, which does not move with each
-    frame: in truth, or in the median of all that was told of a straight leg, NaN on a bent one.
+    frame: in truth, or in the median of all that was told of a straight leg, NaN on a bent one. `told` (n, 4) is the
+    newest line, as Knowledge holds it.
     """
 
     t_ns: Times
@@ -126,6 +127,7 @@ class Lateral:
     aside_m: Floats
     right: Floats
     age_s: Floats
+    told: Floats
     is_true: bool
 
 
@@ -181,6 +183,7 @@ def lateral_of(known: Knowledge, motion: Motion) -> Lateral:
         aside_m=_aside_m(known.told, motion, right) if true_m is None else true_m,
         right=right,
         age_s=age_s,
+        told=line,
         is_true=true_m is not None,
     )
 
