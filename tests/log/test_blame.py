@@ -10,15 +10,19 @@ from pathlib import Path
 import pytest
 import yaml
 
+from mission import guidance
+from mission.autopilot import Setpoint
+from mission.guidance import WorldLine
 from mission.log.blame.blame import find_excursions
 from mission.log.blame.records import Culprit, Fault, Kind
 from mission.log.imported import Imported, ImportedActuators, ImportedLog
 from mission.log.reader import Flight
-from mission.plan import MissionPlan
+from mission.plan import MissionPlan, Rotate
+from mission.tasks import follow_lines
 from sitl.gust_front import GustFronts, one_minus_cosine
 from sitl.wind import Wind
 from tests.support.flights import LINE_HEADING_RAD, Cockpit
-from tests.support.logged_flight import fly_and_log
+from tests.support.logged_flight import Bend, fly_and_log
 
 PLAN = MissionPlan.model_validate(
     yaml.safe_load(
@@ -153,6 +157,109 @@ def test_a_line_that_is_lost_to_another_for_a_while_is_blamed_on_perception(
         for told in (flight, without_truth(flight)):
             found = find_excursions(told)
             assert {(one.culprit, one.fault) for one in found} == {(Culprit.PERCEPTION, Fault.WRONG)}, (seed, found)
+
+
+@pytest.mark.parametrize("law", ["beside the line", "away from the line", "off course"])
+def test_a_wrong_law_is_blamed_on_the_executive(law: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The line is told rightly, and the setpoint does not go where it is."""
+    flights = {}
+    for seed in SEEDS[:3]:
+        draw = random.Random(f"{law} {seed}")
+        beside_m, off_course_rad = either_side(draw, 1.7, 2.1), either_side(draw, math.radians(25), math.radians(35))
+        with monkeypatch.context() as patch:
+
+            def go_wrong(_: Cockpit, patch=patch, beside_m=beside_m, off_course_rad=off_course_rad) -> None:
+                if law == "off course":
+
+                    def askew(reference: Setpoint, heading_rad: float, step_m: float) -> Setpoint:
+                        return guidance.step_along(reference, heading_rad + off_course_rad, step_m)
+
+                    patch.setattr(follow_lines, "step_along", askew)
+                    return
+
+                def aside(reference: Setpoint, line: WorldLine, heading_rad: float, gain_per_s: float, *rest, **names):
+                    line, sign = (line, -1.0) if law == "away from the line" else (line.beside(beside_m), 1.0)
+                    return guidance.step_sideways(reference, line, heading_rad, sign * gain_per_s, *rest, **names)
+
+                patch.setattr(follow_lines, "step_sideways", aside)
+
+            flights[seed] = fly(tmp_path / f"{seed}.mcap", seed, go_wrong)
+    check(flights, Culprit.EXECUTIVE, Fault.SETPOINT)
+
+
+def fly_bend(path: Path, seed: int, turn_deg: float, after_s: float, do: Callable[[Cockpit], None]) -> Flight:
+    """Fly along a line that bends as in the world corner."""
+    bend = Bend(35.0, math.radians(turn_deg))
+    leg = PLAN.tasks[4].model_copy(update={"distance_m": 55.0})
+    plan = PLAN.model_copy(update={"tasks": [*PLAN.tasks[:4], leg, PLAN.tasks[5]]})
+    return fly_and_log(
+        path,
+        plan,
+        wind=wind_abeam(seed),
+        seed=seed,
+        in_task="follow_lines",
+        after_s=after_s,
+        do=do,
+        bend=bend,
+        until="return",
+    )
+
+
+def test_a_vehicle_whose_attitude_does_not_follow_in_a_bend_is_the_autopilots(tmp_path: Path) -> None:
+    def slacken(cockpit: Cockpit) -> None:
+        for name in ("MC_ROLL_P", "MC_PITCH_P"):
+            cockpit.autopilot.sim.set_parameter(name, 1.0)
+
+    flights = {seed: fly_bend(tmp_path / f"{seed}.mcap", seed, 30.0, 12.0, slacken) for seed in SEEDS[:4]}
+    check(flights, Culprit.AUTOPILOT, Fault.TRACKING)
+
+
+def test_a_bend_that_is_told_late_is_named_as_that(tmp_path: Path) -> None:
+    def hide(cockpit: Cockpit) -> None:
+        cockpit.eyes.is_bend_hidden = True
+
+    n_named = 0
+    for seed in SEEDS[:4]:
+        flight = fly_bend(tmp_path / f"{seed}.mcap", seed, 30.0, 4.0, hide)
+        for log in (flight, without_truth(flight)):
+            found = find_excursions(log)
+            assert all((one.culprit, one.fault) == (Culprit.PERCEPTION, Fault.BEND) for one in found), (seed, found)
+            n_named += bool(found)
+    assert n_named >= 2
+
+
+def test_a_bend_that_is_told_in_time_is_nobody_elses_fault(tmp_path: Path) -> None:
+    for seed in SEEDS[:4]:
+        flight = fly_bend(tmp_path / f"{seed}.mcap", seed, 60.0, 4.0, lambda _: None)
+        for log in (flight, without_truth(flight)):
+            found = find_excursions(log)
+            assert all((one.culprit, one.fault) == (Culprit.EXECUTIVE, Fault.BEND) for one in found), (seed, found)
+
+
+@pytest.mark.parametrize("cause", ["line that jumps", "weak motor", "delayed estimate"])
+def test_a_second_leg_is_looked_at_as_the_first(cause: str, tmp_path: Path) -> None:
+    """After a turn on the spot the line is flown back along, and only there something goes wrong."""
+    act, culprit, fault = CAUSES[cause]
+    leg = PLAN.tasks[4].model_copy(update={"distance_m": 25.0})
+    turn = Rotate(task="rotate", angle_deg=180.0)
+    plan = PLAN.model_copy(update={"tasks": [*PLAN.tasks[:4], leg, turn, leg, PLAN.tasks[5]]})
+    flights = {}
+    for seed in SEEDS[:3]:
+        draw = random.Random(f"{cause} {seed}")
+        flights[seed] = fly_and_log(
+            tmp_path / f"{seed}.mcap",
+            plan,
+            wind=wind_abeam(seed),
+            seed=seed,
+            in_task="follow_lines",
+            nth=2,
+            after_s=3.0,
+            do=lambda cockpit, draw=draw: act(cockpit, draw),
+            until="return",
+        )
+        second_ns = [begun.t_ns for begun in flights[seed].tasks_started if begun.task == "follow_lines"][1]
+        assert all(one.start_ns >= second_ns for one in find_excursions(flights[seed]))
+    check(flights, culprit, fault)
 
 
 def test_nobody_is_blamed_for_a_flight_without_trouble(tmp_path: Path) -> None:

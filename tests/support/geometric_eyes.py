@@ -131,9 +131,9 @@ class GeometricEyes:
 
     `failure` is a dead worker, `impairment` a camera that is gone or blind. `latency_ns` is from a frame to its report,
     `stamp_late_ns` by how much later than it was taken a frame says that it was, `askew_rad` as for `see_line`. They
-    take another line for it, `aside_m` to the right of it and turned by `turned_rad` to the right below the vehicle. With
-    `bend_m` and `bend_rad` the line turns to the right so far beyond its point; `is_bend_hidden` keeps from them what is
-    not the nearer span.
+    take another line for it, `aside_m` to the right of it and turned by `turned_rad` to the right below the vehicle.
+    With `bend_m` and `bend_rad` the line turns to the right so far beyond its point; `is_bend_hidden` keeps from them
+    what is not the nearer span.
     """
 
     def __init__(

@@ -1,5 +1,6 @@
 """Whether the line as told moved: a line stands still, so what moves is another one, or a wrong place of it. Pure."""
 
+import itertools
 import math
 from dataclasses import dataclass
 
@@ -15,6 +16,8 @@ _WITHIN_S = 1.0  # a move in several frames is one
 _LEAST_M = 0.4
 _SHARE = 0.5  # of the excursion
 _TURN_RAD = math.radians(6.0)
+_FLICKER_S = 0.5  # does not steer
+_BACK_S = 6.0  # a span takes longer
 _BEND_AWAY_M = 12.0  # at most so far from the vehicle the line may bend (mission/known_line.py)
 
 
@@ -45,6 +48,7 @@ def jump_before(leg: Leg, start_ns: int, peak: int, off_m: float) -> Jump | None
     way_m = np.cumsum(steps_m)
     before = np.searchsorted(t_ns, t_ns[window] - round(_WITHIN_S * NS_PER_S))
     moves_m = way_m[window] - way_m[np.maximum(before, window[0])]
+    moves_m[~np.isfinite(moves_m)] = 0.0
     end = int(window[np.abs(moves_m).argmax()])
     moved_m = float(moves_m[np.abs(moves_m).argmax()])
     if abs(moved_m) < max(_LEAST_M, _SHARE * off_m):
@@ -57,6 +61,39 @@ def jump_before(leg: Leg, start_ns: int, peak: int, off_m: float) -> Jump | None
     told_ns = lateral.told[[first - 1, end], 3]
     own_m = float((leg.motion.position_m[end, :2] - leg.motion.position_m[first - 1, :2]) @ lateral.right[end])
     return Jump(int(t_ns[end]), float(told_ns[1] - told_ns[0]) / NS_PER_S, float(steps_m[first : end + 1].sum()), own_m)
+
+
+def turned_away_and_back(leg: Leg, start_ns: int, peak: int) -> tuple[float, float] | None:
+    """By how much the line as told turned [rad], and after how long it turned back [s]; None where it did not.
+
+    No span is so short that a vehicle would be over the next but one that soon.
+    """
+    lateral = leg.lateral
+    t_ns = lateral.t_ns
+    near = (t_ns >= start_ns - round((GROWTH_S + _BACK_S) * NS_PER_S)) & (
+        t_ns <= t_ns[peak] + round(_BACK_S * NS_PER_S)
+    )
+    near = np.flatnonzero(near & np.isfinite(lateral.told[:, 2]))
+    headings_rad = np.unwrap(lateral.told[near, 2], period=np.pi)
+    turns = np.flatnonzero(np.abs(np.diff(headings_rad)) > _TURN_RAD) + 1
+    for first, then in itertools.pairwise(turns.tolist()):
+        away_rad = headings_rad[first] - headings_rad[first - 1]
+        left_rad = headings_rad[then] - headings_rad[first - 1]
+        took_s = float(t_ns[near[then]] - t_ns[near[first]]) / NS_PER_S
+        # At a real bend the frames may tell of either span for a moment, but of another one in the end than before.
+        whole_rad = headings_rad[-1] - headings_rad[0]
+        if max(abs(left_rad), abs(whole_rad)) < 0.3 * abs(away_rad) and _FLICKER_S < took_s < _BACK_S:
+            return float(away_rad), took_s
+    return None
+
+
+def turn_words(away_rad: float, took_s: float) -> tuple[str, ...]:
+    """Such a turn in a sentence."""
+    side = "right" if away_rad > 0 else "left"
+    return (
+        f"The line that the camera told of turned by {math.degrees(abs(away_rad)):.0f} degrees to the {side} and back "
+        f"within {took_s:.1f} s, as no power line does: something else was taken for it.",
+    )
 
 
 def jump_words(jump: Jump) -> tuple[str, str]:
