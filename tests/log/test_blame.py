@@ -65,7 +65,15 @@ class OneGust(GustFronts):
 def fly(path: Path, seed: int, do: Callable[[Cockpit], None], gust: OneGust | None = None) -> Flight:
     """Fly along the line in a wind that comes from somewhere abeam; `do` is done four seconds into the leg."""
     return fly_and_log(
-        path, PLAN, wind=wind_abeam(seed, gust), seed=seed, in_task="follow_lines", after_s=4.0, do=do, until="return"
+        path,
+        PLAN,
+        wind=wind_abeam(seed, gust),
+        seed=seed,
+        in_task="follow_lines",
+        after_s=4.0,
+        do=do,
+        until="return",
+        until_s=20.0,
     )
 
 
@@ -202,6 +210,7 @@ def fly_bend(path: Path, seed: int, turn_deg: float, after_s: float, do: Callabl
         do=do,
         bend=bend,
         until="return",
+        until_s=20.0,
     )
 
 
@@ -256,6 +265,7 @@ def test_a_second_leg_is_looked_at_as_the_first(cause: str, tmp_path: Path) -> N
             after_s=3.0,
             do=lambda cockpit, draw=draw: act(cockpit, draw),
             until="return",
+            until_s=20.0,
         )
         second_ns = [begun.t_ns for begun in flights[seed].tasks_started if begun.task == "follow_lines"][1]
         assert all(one.start_ns >= second_ns for one in find_excursions(flights[seed]))

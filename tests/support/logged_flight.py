@@ -79,10 +79,12 @@ def fly_and_log(
     nth: int = 1,
     bend: Bend | None = None,
     until: str | None = None,
+    until_s: float | None = None,
 ) -> Flight:
     """Fly a plan; `do` is called once, `after_s` into the `nth` task named `in_task`. Returns what the log holds.
 
-    The flight breaks off where a task named `until` begins: what nobody looks at need not be flown.
+    The flight breaks off where a task named `until` begins, or `until_s` after `do`: what nobody looks at need not be
+    flown.
     """
 
     async def flight() -> None:
@@ -103,7 +105,10 @@ def fly_and_log(
             n_begun += started.task == in_task
             if started.task == in_task and n_begun == nth:
                 cockpit = Cockpit(executive, autopilot, eyes, computer)
-                asyncio.get_running_loop().call_later(after_s, do, cockpit)
+                loop = asyncio.get_running_loop()
+                loop.call_later(after_s, do, cockpit)
+                if until_s is not None:
+                    loop.call_later(after_s + until_s, flying.cancel)
 
         recorder = _TellingRecorder(path, mission_text="", mission_name=plan.name, metadata={}, clock=clock)
         recorder.on_task = on_task

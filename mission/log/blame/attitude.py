@@ -75,8 +75,8 @@ def off_heading(leg: Leg, limits: Limits) -> Iterator[Excursion]:
         sunk_m = float(np.nan_to_num(motion.position_m[nearby, 2] - motion.setpoint_m[nearby, 2]).max())
         side = "right" if off_rad[peak] > 0 else "left"
         words = [
-            f"The nose turned {math.degrees(abs(off_rad[peak])):.0f} degrees to the {side} though it was told to stay, "
-            "as with a weak motor: air alone hardly turns a multirotor."
+            f"The nose turned {math.degrees(abs(off_rad[peak])):.0f} degrees to the {side} though it was told to stay: "
+            "air alone hardly turns a multirotor."
         ]
         if sunk_m > 0.15:
             words.append(
