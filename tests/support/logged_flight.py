@@ -1,10 +1,11 @@
 """A flight in virtual time that is logged with its truth, and read back: the executive, the vehicle, geometric eyes."""
 
 import asyncio
+import contextlib
 import json
 import math
 from collections.abc import Callable
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 
 from drivers.clock import NS_PER_S
@@ -30,12 +31,28 @@ _TRUTH_PERIOD_NS = NS_PER_S // 20
 _REACH_M = 200.0
 
 
-def _true_line() -> TrueLine:
+@dataclass(frozen=True, slots=True)
+class Bend:
+    """The line turns by `turn_rad` to the right, `after_m` [m] beyond where the vehicle meets it."""
+
+    after_m: float
+    turn_rad: float
+
+
+def _true_line(bend: Bend | None) -> TrueLine:
     north_m, east_m, down_m = LINE_POINT_NED_M
-    ends = [
-        (north_m + reach_m * math.cos(LINE_HEADING_RAD), east_m + reach_m * math.sin(LINE_HEADING_RAD))
-        for reach_m in (-_REACH_M, _REACH_M)
-    ]
+
+    def on_line(reach_m: float) -> tuple[float, float]:
+        straight_m = reach_m if bend is None else min(reach_m, bend.after_m)
+        turned_rad = LINE_HEADING_RAD + (0.0 if bend is None else bend.turn_rad)
+        beyond_m = reach_m - straight_m
+        return (
+            north_m + straight_m * math.cos(LINE_HEADING_RAD) + beyond_m * math.cos(turned_rad),
+            east_m + straight_m * math.sin(LINE_HEADING_RAD) + beyond_m * math.sin(turned_rad),
+        )
+
+    reaches_m = (-_REACH_M, _REACH_M) if bend is None else (-_REACH_M, bend.after_m, _REACH_M)
+    ends = [on_line(reach_m) for reach_m in reaches_m]
     return TrueLine(tuple(ends), (tuple((*end, down_m) for end in ends),), ())
 
 
@@ -59,9 +76,16 @@ def fly_and_log(
     in_task: str,
     after_s: float,
     do: Callable[[Cockpit], None],
-    has_truth: bool = True,
+    nth: int = 1,
+    bend: Bend | None = None,
+    until: str | None = None,
+    until_s: float | None = None,
 ) -> Flight:
-    """Fly a plan; `do` is called once, `after_s` into the first task named `in_task`. Returns what the log holds."""
+    """Fly a plan; `do` is called once, `after_s` into the `nth` task named `in_task`. Returns what the log holds.
+
+    The flight breaks off where a task named `until` begins, or `until_s` after `do`: what nobody looks at need not be
+    flown.
+    """
 
     async def flight() -> None:
         clock = VirtualClock()
@@ -70,14 +94,21 @@ def fly_and_log(
         camera = pinhole_intrinsics(plan.camera)
         eyes = GeometricEyes(autopilot.true_pose, clock, camera, LINE_POINT_NED_M, LINE_HEADING_RAD)
         computer = Computer()
-        is_done = False
+        if bend is not None:
+            eyes.bend_m, eyes.bend_rad = bend.after_m, bend.turn_rad
+        n_begun = 0
 
         def on_task(started: TaskStarted) -> None:
-            nonlocal is_done
-            if started.task == in_task and not is_done:
-                is_done = True
+            nonlocal n_begun
+            if started.task == until:
+                flying.cancel()
+            n_begun += started.task == in_task
+            if started.task == in_task and n_begun == nth:
                 cockpit = Cockpit(executive, autopilot, eyes, computer)
-                asyncio.get_running_loop().call_later(after_s, do, cockpit)
+                loop = asyncio.get_running_loop()
+                loop.call_later(after_s, do, cockpit)
+                if until_s is not None:
+                    loop.call_later(after_s + until_s, flying.cancel)
 
         recorder = _TellingRecorder(path, mission_text="", mission_name=plan.name, metadata={}, clock=clock)
         recorder.on_task = on_task
@@ -93,13 +124,14 @@ def fly_and_log(
 
         with recorder:
             recorder.record(Attachment("camera.json", "application/json", json.dumps(asdict(camera)).encode()))
-            if has_truth:
-                recorder.record(_true_line())
-                autopilot.after_step.append(tell_truth)
+            recorder.record(_true_line(bend))
+            autopilot.after_step.append(tell_truth)
             crew = Crew(autopilot, eyes, camera, recorder, Logbook(NoJournal(), PAPERS), lambda: computer.view)
             executive = Executive(plan, crew, clock)
-            await executive.run()
-        assert is_done, f"the flight never came to {in_task}"
+            flying = asyncio.ensure_future(executive.run())
+            with contextlib.suppress(asyncio.CancelledError):
+                await flying
+        assert n_begun >= nth, f"the flight never came to {in_task}"
         assert recorder.failure is None
 
     run_virtually(flight())

@@ -28,7 +28,7 @@ def off_height(leg: Leg, limits: Limits) -> Iterator[Excursion]:
         peak = int(inside[np.abs(below_m[inside]).argmax()])
         tilt_rad = float(motion.tilt_rad[inside].max())
         is_tilted = tilt_rad > TILT_LIMIT_RAD
-        words = [f"{abs(below_m[peak]):.2f} m {'below' if below_m[peak] > 0 else 'above'} its setpoint"]
+        words = [f"The vehicle flew {abs(below_m[peak]):.2f} m too {'low' if below_m[peak] > 0 else 'high'}."]
         culprit, fault = Culprit.AUTOPILOT, Fault.TRACKING
         moved_m = _setpoint_moved_m(motion, peak, math.copysign(1.0, below_m[peak]))
         if moved_m > 0.5 * abs(below_m[peak]):
@@ -75,8 +75,8 @@ def off_heading(leg: Leg, limits: Limits) -> Iterator[Excursion]:
         sunk_m = float(np.nan_to_num(motion.position_m[nearby, 2] - motion.setpoint_m[nearby, 2]).max())
         side = "right" if off_rad[peak] > 0 else "left"
         words = [
-            f"the nose turned {math.degrees(abs(off_rad[peak])):.0f} degrees to the {side} while its "
-            "setpoint stood still: air alone hardly turns a multirotor"
+            f"The nose turned {math.degrees(abs(off_rad[peak])):.0f} degrees to the {side} though it was told to stay: "
+            "air alone hardly turns a multirotor."
         ]
         if sunk_m > 0.15:
             words.append(

@@ -7,6 +7,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.clock import NS_PER_S
+from mission.log.blame.bend import bend_near, of_bend
+from mission.log.blame.following import delay_s
+from mission.log.blame.jump import jump_before, jump_words, turn_words, turned_away_and_back
 from mission.log.blame.leg import Leg
 from mission.log.blame.perception import lag_words, lateness, of_perception, of_unseen
 from mission.log.blame.records import Culprit, Excursion, Fault, Kind, Limits
@@ -45,6 +48,16 @@ def off_line(leg: Leg, limits: Limits) -> Iterator[Excursion]:
             culprit, fault, evidence = _of_executive(leg, start_ns, end_ns, shares["executive"])
         else:
             culprit, fault, evidence = of_tracking(leg.motion, lateral, peak, side)
+        if culprit is not Culprit.PERCEPTION:
+            jump = jump_before(leg, start_ns, peak, float(abs(off_m[peak])))
+            turned = turned_away_and_back(leg, start_ns, peak)
+            bend = bend_near(leg, start_ns, peak)
+            if jump is not None:
+                culprit, fault, evidence = Culprit.PERCEPTION, Fault.WRONG, jump_words(jump)
+            elif turned is not None:
+                culprit, fault, evidence = Culprit.PERCEPTION, Fault.WRONG, turn_words(*turned)
+            elif bend is not None and culprit is Culprit.EXECUTIVE:
+                culprit, fault, evidence = of_bend(bend, float(abs(off_m[peak])), delay_s(leg.motion))
         words = "right" if side > 0 else "left"
         as_known = "" if lateral.is_true else " as it was known"
         parts = {
@@ -66,7 +79,7 @@ def off_line(leg: Leg, limits: Limits) -> Iterator[Excursion]:
             culprit,
             fault,
             {name: round(value, 3) for name, value in shares.items() if math.isfinite(value)},
-            (first, *evidence),
+            (*evidence[:1], first, *evidence[1:]),
         )
 
 
@@ -75,7 +88,11 @@ def _of_nothing(
 ) -> tuple[Culprit, Fault, tuple[str, ...]]:
     """Nothing can be divided: the line was not told, or nothing was sent."""
     if np.isfinite(leg.lateral.age_s[beyond]).any():
-        return Culprit.EXECUTIVE, Fault.SETPOINT, ("no setpoint was sent meanwhile",)
+        return (
+            Culprit.EXECUTIVE,
+            Fault.SETPOINT,
+            ("No setpoint was sent meanwhile: the autopilot had nothing to fly to.",),
+        )
     return of_perception(leg, start_ns, end_ns, beyond)
 
 
@@ -83,8 +100,10 @@ def _of_executive(leg: Leg, start_ns: int, end_ns: int, share_m: float) -> tuple
     """A setpoint off the line as told: the law's own doing, unless what it was told came late."""
     late = lateness(leg, start_ns, end_ns)
     if late is not None:
-        return Culprit.PERCEPTION, Fault.LATE, (late,)
-    words = f"the setpoint ran {share_m:.2f} m beside the line as it was known then, which the vehicle followed"
+        return Culprit.PERCEPTION, Fault.LATE, late
+    words = (
+        f"The mission steered {share_m:.2f} m beside the line, though it was told where that is: the vehicle followed."
+    )
     return Culprit.EXECUTIVE, Fault.SETPOINT, (words,)
 
 
@@ -100,7 +119,18 @@ def unseen(leg: Leg, limits: Limits) -> Iterator[Excursion]:
         start_ns = max(leg.start_ns, first_ns - round(limits.unseen_s * NS_PER_S))
         culprit, fault, evidence = of_unseen(leg, start_ns, end_ns)
         told = f"for {peak_s:.1f} s nothing told where the line was"
-        yield Excursion(Kind.UNSEEN, leg.task, start_ns, end_ns, peak_s, "s", culprit, fault, {}, (told, *evidence))
+        yield Excursion(
+            Kind.UNSEEN,
+            leg.task,
+            start_ns,
+            end_ns,
+            peak_s,
+            "s",
+            culprit,
+            fault,
+            {},
+            (*evidence[:1], told, *evidence[1:]),
+        )
 
 
 def misdated(leg: Leg, limits: Limits) -> Iterator[Excursion]:
@@ -116,7 +146,7 @@ def misdated(leg: Leg, limits: Limits) -> Iterator[Excursion]:
             Culprit.PERCEPTION,
             Fault.LATE,
             {},
-            (lag_words(leg.lag),),
+            lag_words(leg.lag),
         )
 
 

@@ -42,6 +42,8 @@ class Fault(enum.StrEnum):
     """Nothing was told."""
     SETPOINT = "setpoint"
     """The setpoint was not on the line as it was known."""
+    BEND = "bend"
+    """The line turned onto another span, and that was told late, or flown too sharply to be followed."""
     TRACKING = "tracking"
     """The vehicle was not at its setpoint, and nothing pushed it."""
     PUSHED = "pushed"

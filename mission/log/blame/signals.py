@@ -17,6 +17,8 @@ GRAVITY_M_S2 = 9.80665
 _SLOPE_S = 0.4  # over which a velocity's slope is taken: telemetry comes 20 times a second and is rough
 
 _STRAIGHT_RAD = np.radians(8.0)
+_BEND_S = 3.0  # before and after a bend, the other span may be the nearer one
+_BEND_AWAY_M = 12.0  # at most so far from the vehicle the line may bend (mission/known_line.py)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -115,7 +117,8 @@ class Lateral:
     `perception_m`, by which the line was elsewhere than told, `executive_m`, by which the setpoint was off the line as
     told, and `tracking_m`, by which the vehicle was off its setpoint. NaN where nothing was told yet. `age_s` is how
     old the newest place of the line was. `aside_m` is the way from the line as it lies, which does not move with each
-    frame: in truth, or in the median of all that was told of a straight leg, NaN on a bent one.
+    frame: in truth, or in the median of all that was told of a straight leg, NaN on a bent one. `told` (n, 4) is the
+    newest line, as Knowledge holds it.
     """
 
     t_ns: Times
@@ -126,6 +129,7 @@ class Lateral:
     aside_m: Floats
     right: Floats
     age_s: Floats
+    told: Floats
     is_true: bool
 
 
@@ -165,8 +169,9 @@ def knowledge_of(flight: Flight) -> Knowledge:
 def lateral_of(known: Knowledge, motion: Motion) -> Lateral:
     """Divide the way off the line, at the times of `motion`, among those who made it."""
     t_ns, n = motion.t_ns, len(motion.t_ns)
-    line = held_at(t_ns, known.told_ns, known.told, longest_s=np.inf)
-    age_s = (t_ns - line[:, 3]) / NS_PER_S
+    told = held_at(t_ns, known.told_ns, known.told, longest_s=np.inf)
+    age_s = (t_ns - told[:, 3]) / NS_PER_S
+    line = _nearer_span(motion, told)
     line_along = np.where(np.cos(line[:, 2] - motion.yaw_rad) < 0.0, line[:, 2] + np.pi, line[:, 2])
     right = np.stack([-np.sin(line_along), np.cos(line_along)], axis=1)
     believed_m = ((motion.position_m[:, :2] - line[:, :2]) * right).sum(axis=1)
@@ -181,8 +186,42 @@ def lateral_of(known: Knowledge, motion: Motion) -> Lateral:
         aside_m=_aside_m(known.told, motion, right) if true_m is None else true_m,
         right=right,
         age_s=age_s,
+        told=told,
         is_true=true_m is not None,
     )
+
+
+def _nearer_span(motion: Motion, told: Floats) -> Floats:
+    """The line at each time (n, 4): as told, but near a bend the span of both that is nearer to the vehicle.
+
+    The old one ends at the bend and the new one begins there: what goes on straight is not the line.
+    """
+    line, t_ns = told.copy(), motion.t_ns
+    turn_rad = np.abs(np.remainder(np.diff(told[:, 2]) + np.pi / 2, np.pi) - np.pi / 2)
+    for k in (np.flatnonzero(np.nan_to_num(turn_rad) > _STRAIGHT_RAD) + 1).tolist():
+        old, new = told[k - 1], told[k]
+        before, after = (_way_along(span[2], motion.yaw_rad[k]) for span in (old, new))
+        normal = np.array([-after[1], after[0]])
+        to_bend_m = float((new[:2] - old[:2]) @ normal) / float(before @ normal)
+        if abs(to_bend_m) > _BEND_AWAY_M:
+            continue  # not a bend: another line
+        near = slice(*np.searchsorted(t_ns, [t_ns[k] - round(_BEND_S * NS_PER_S), t_ns[k] + round(_BEND_S * NS_PER_S)]))
+        beyond_m = motion.position_m[near, :2] - (old[:2] + to_bend_m * before)
+        is_new = _ray_distance_m(beyond_m, after) < _ray_distance_m(beyond_m, -before)
+        line[near] = np.where(is_new[:, None], new, old)
+    return line
+
+
+def _way_along(line_heading_rad: float, yaw_rad: float) -> Floats:
+    """The direction along a line, of both the one that is flown."""
+    sign = 1.0 if np.cos(line_heading_rad - yaw_rad) >= 0.0 else -1.0
+    return sign * np.array([np.cos(line_heading_rad), np.sin(line_heading_rad)])
+
+
+def _ray_distance_m(places_m: Floats, way: Floats) -> Floats:
+    """How far places (n, 2) are from the ray that begins at the origin and runs along `way`."""
+    along_m = np.maximum(places_m @ way, 0.0)
+    return np.asarray(np.linalg.norm(places_m - along_m[:, None] * way, axis=1))
 
 
 def _aside_m(told: Floats, motion: Motion, right: Floats) -> Floats:

@@ -32,11 +32,11 @@ def tilted(motion: Motion, tasks: Sequence[TaskSpan], limits: Limits) -> Iterato
         if is_wind and _speed_along_m_s(motion.t_ns[inside], motion.position_m[inside], thrust) > _FAST_M_S:
             continue  # a fast flight, as the autopilot's return: the air is that of its own speed
         share = f"{100 * max(0.0, taken_up):.0f} % of what its thrust did"
-        words = f"the air took up only {share}: it gathered speed"
+        words = f"The vehicle leaned as far as it may and flew away: the air took up only {share}."
         if is_wind:
             words = (
-                f"the air pushed with {push_m_s2:.1f} m/s2 and took up {share}: the wind was about as strong as this "
-                "vehicle can hold"
+                f"The wind was about as strong as this vehicle can hold: it pushed with {push_m_s2:.1f} m/s2 and took "
+                f"up {share}."
             )
         yield Excursion(
             Kind.TILTED,

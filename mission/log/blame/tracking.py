@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.clock import NS_PER_S
+from mission.log.blame.following import delay_s, follow
 from mission.log.blame.leg import GROWTH_S
 from mission.log.blame.records import Culprit, Fault
 from mission.log.blame.signals import Lateral, Motion, slope
@@ -18,7 +19,7 @@ TILT_LIMIT_RAD = math.radians(38.0)
 _BEGUN = 0.25  # share of its peak where an excursion began
 _BEFORE_S = 2.0
 _SLOW = 0.1  # share of its greatest speed
-_TURNED_RAD = math.radians(8.0)  # the line as told, at a bend
+_OWN_SHARE, _OWN_M = 0.5, 0.5  # of the way off the line, which a sound vehicle would not have been
 
 
 def of_tracking(motion: Motion, lateral: Lateral, peak: int, side: float) -> tuple[Culprit, Fault, tuple[str, ...]]:
@@ -27,39 +28,51 @@ def of_tracking(motion: Motion, lateral: Lateral, peak: int, side: float) -> tup
     The setpoint itself, where it went away; else the air or the vehicle's own thrust, whichever gave it the larger
     impulse while it gathered way.
     """
-    tracking_m = side * lateral.tracking_m
-    first = _growth_start(motion.t_ns, tracking_m, peak)
-    right = side * lateral.right
-    pushed = (motion.push_m_s2 * right).sum(axis=1)
-    thrust = (motion.thrust_m_s2 * right).sum(axis=1)
+    t_ns = motion.t_ns
+    right = side * lateral.right[peak]
+    tracking_m = (motion.position_m - motion.setpoint_m)[:, :2] @ right
+    first = _growth_start(t_ns, tracking_m, peak)
     during = slice(first, peak + 1)
-    moved_m = float(
-        -side * (motion.setpoint_m[during][-1, :2] - motion.setpoint_m[during][0, :2]) @ lateral.right[peak]
-    )
-    turned_rad = float(np.ptp(np.unwrap(np.arctan2(*lateral.right[during].T), period=np.pi)))
-    if turned_rad > _TURNED_RAD or moved_m > 0.5 * abs(tracking_m[peak]):
-        return Culprit.EXECUTIVE, Fault.SETPOINT, (_moved_words(moved_m, turned_rad),)
+    # What a sound vehicle would have done, that comes behind its setpoint as any does, is the setpoint's doing.
+    earliest = int(np.searchsorted(t_ns, t_ns[peak] - round(GROWTH_S * NS_PER_S)))
+    late_s = delay_s(motion)
+    sound_m, sound_m_s2 = follow(motion, earliest, peak, late_s)
+    excess_m, wanted_m_s2 = np.zeros(len(t_ns)), np.zeros(len(t_ns))
+    excess_m[earliest : peak + 1] = (motion.position_m[earliest : peak + 1, :2] - sound_m) @ right
+    wanted_m_s2[earliest : peak + 1] = sound_m_s2 @ right
+    off_m = float(np.nan_to_num(side * lateral.off_m[peak]))
+    if excess_m[peak] < max(_OWN_M, _OWN_SHARE * min(off_m if off_m > 0.0 else math.inf, float(tracking_m[peak]))):
+        moved_m = float(-(motion.setpoint_m[peak, :2] - motion.setpoint_m[first, :2]) @ right)
+        sound = off_m - float(excess_m[peak])
+        return Culprit.EXECUTIVE, Fault.SETPOINT, _moved_words(moved_m, sound, late_s)
+    pushed = motion.push_m_s2 @ right
+    thrust = motion.thrust_m_s2 @ right
     # Up to the turning point whatever moved it is braked again: what counts is how it got its way on.
-    speed_m_s = slope(motion.t_ns, np.nan_to_num(tracking_m)[:, None])[:, 0]
+    speed_m_s = slope(t_ns[: peak + 1], excess_m[: peak + 1, None])[:, 0]
     fastest = first + int(speed_m_s[during].argmax())
-    set_off = _set_off(motion.t_ns, speed_m_s, fastest)
-    calm = pushed[int(np.searchsorted(motion.t_ns, motion.t_ns[set_off] - round(_BEFORE_S * NS_PER_S))) : set_off + 1]
+    set_off = _set_off(t_ns, speed_m_s, fastest)
+    calm = pushed[int(np.searchsorted(t_ns, t_ns[set_off] - round(_BEFORE_S * NS_PER_S))) : set_off + 1]
     steady = float(np.median(calm))  # what the thrust was balancing when it began: a lull moves a vehicle, too
     gathering = slice(set_off, fastest + 1)
-    t_s = motion.t_ns[gathering] / NS_PER_S
+    t_s = t_ns[gathering] / NS_PER_S
     push_m_s = float(np.trapezoid(pushed[gathering] - steady, t_s))
-    thrust_m_s = float(np.trapezoid(thrust[gathering] + steady, t_s))
+    thrust_m_s = float(np.trapezoid(thrust[gathering] + steady - wanted_m_s2[gathering], t_s))
     tilt_rad = float(motion.tilt_rad[during].max())
-    words = [
+    figures = [
         f"it left its setpoint by {tracking_m[peak]:.2f} m, at up to {speed_m_s[fastest]:.1f} m/s: in "
         f"{t_s[-1] - t_s[0]:.1f} s {_went('the air pushed it', push_m_s)}, "
-        f"{_went('its own thrust took it', thrust_m_s)}, compared with just before"
+        f"{_went('its own thrust took it', thrust_m_s)}, compared with a sound vehicle and with just before"
     ]
     if tilt_rad > TILT_LIMIT_RAD:
-        words.append(f"it was tilted by {math.degrees(tilt_rad):.0f} degrees, which is about as far as it may")
+        figures.append(f"it was tilted by {math.degrees(tilt_rad):.0f} degrees, which is about as far as it may")
     if push_m_s > max(0.0, thrust_m_s) or (tilt_rad > TILT_LIMIT_RAD and thrust_m_s <= 0.0):
-        return Culprit.WIND, Fault.PUSHED, tuple(words)
-    return Culprit.AUTOPILOT, Fault.TRACKING, tuple(words)
+        words = f"The wind pushed the vehicle {tracking_m[peak]:.2f} m off where it was told to fly."
+        return Culprit.WIND, Fault.PUSHED, (words, *figures)
+    words = (
+        f"The autopilot flew {tracking_m[peak]:.2f} m beside where it was told to fly, by its own thrust: a loop that "
+        "is badly tuned, or a motor that is weak."
+    )
+    return Culprit.AUTOPILOT, Fault.TRACKING, (words, *figures)
 
 
 def _growth_start(t_ns: NDArray[np.int64], values: Floats, peak: int) -> int:
@@ -82,10 +95,8 @@ def _went(who: str, away_m_s: float) -> str:
     return f"{who} {'away' if away_m_s > 0.0 else 'back'} by {abs(away_m_s):.1f} m/s"
 
 
-def _moved_words(moved_m: float, turned_rad: float) -> str:
-    if turned_rad > _TURNED_RAD:
-        return (
-            f"the line as told turned by {math.degrees(turned_rad):.0f} degrees here, and the setpoint went over to "
-            "the new span at once: the vehicle came behind it"
-        )
-    return f"the setpoint went {moved_m:.2f} m aside, and the vehicle came behind it"
+def _moved_words(moved_m: float, sound_m: float, late_s: float) -> tuple[str, str]:
+    return (
+        f"The setpoint went {abs(moved_m):.2f} m aside, and the vehicle came behind it as it should.",
+        f"a sound vehicle, {late_s:.2f} s behind its setpoint, would have been {sound_m:.2f} m off the line, too",
+    )

@@ -87,13 +87,18 @@
     off_heading: "Off its heading", tilted: "Leaning as far as it may",
   };
 
+  const PARTS = {
+    perception: "the camera's line beside the real one", executive: "the setpoint beside the camera's line",
+    tracking: "the vehicle beside its setpoint",
+  };
+
   function blame() {
     for (const trouble of report.excursions) {
       const total = Object.values(trouble.shares).filter((v) => v > 0).reduce((a, b) => a + b, 0);
       const shares = total ? make("div", { class: "shares", "aria-hidden": "true" }, ...Object.entries(trouble.shares)
         .filter(([, value]) => value > 0)
         .map(([who, value]) => {
-          const part = make("i", { title: `${who} ${withUnit(value, trouble.unit)}` });
+          const part = make("i", { title: `${PARTS[who] ?? who}: ${withUnit(value, trouble.unit)}` });
           part.style.flex = value / total;
           part.style.background = color(who === "tracking" ? trouble.culprit === "wind" ? "wind" : "autopilot" : who);
           return part;
