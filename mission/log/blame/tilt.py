@@ -35,7 +35,7 @@ def tilted(motion: Motion, tasks: Sequence[TaskSpan], limits: Limits) -> Iterato
         words = f"The vehicle leaned as far as it may and flew away: the air took up only {share}."
         if is_wind:
             words = (
-                f"The wind was about as strong as this vehicle can hold: it pushed with {push_m_s2:.1f} m/s2 and took "
+                f"The wind was about as strong as this vehicle can hold: it pushed with {push_m_s2:.1f} m/s² and took "
                 f"up {share}."
             )
         yield Excursion(
