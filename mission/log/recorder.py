@@ -17,14 +17,15 @@ from mission.log.records import LoggedMission, LogHealth, SentSetpoint, StatusTe
 _MAX_RECORDS = 20_000  # a minute or more of all streams
 _MAX_IMAGES = 50
 _FLUSH_PERIOD_S = 1.0
+_OPEN_TIMEOUT_S = 5.0  # a disk that hangs is no reason to wait for ever, on the ground neither
 _CLOSE_TIMEOUT_S = 10.0
 
 
 class Recorder:
     """Records a flight; a context manager, which opens the file and closes it.
 
-    Entering raises LogError when the file cannot be made (it must not exist yet). From then on no method raises or
-    waits: when the disk will not take more, `failure` says so in a sentence and the flight goes on. `clock` ties flight
+    Entering raises LogError when the file cannot be made (it must not exist yet), and waits until the mission is on the
+    disk: whenever the program is killed then, the log opens. From then on no method raises or waits: when the disk will not take more, `failure` says so in a sentence and the flight goes on. `clock` ties flight
     time to Unix time once, at the start, which `mission` keeps; `metadata` is kept beside the mission file.
     """
 
@@ -50,6 +51,7 @@ class Recorder:
         )
         self._backlog = Backlog(_MAX_RECORDS, _MAX_IMAGES)
         self._thread = threading.Thread(target=self._write_all, name="flight log", daemon=True)
+        self._is_begun = threading.Event()
         self._file: LogFile | None = None
         self._fault: str | None = None
 
@@ -84,6 +86,7 @@ class Recorder:
         self._file = LogFile(self.path)
         self._backlog.put(self.mission)
         self._thread.start()
+        self._is_begun.wait(_OPEN_TIMEOUT_S)
         return self
 
     def __exit__(
@@ -99,7 +102,7 @@ class Recorder:
         assert self._file is not None  # noqa: S101
         try:
             log = McapLog(self._file, self.mission)
-            next_flush_s = time.monotonic()  # at once: a log that is cut off in its first second opens, too
+            next_flush_s = time.monotonic()  # at once
             while (records := self._backlog.take(_FLUSH_PERIOD_S)) is not None:
                 for record in records:
                     if self._file.failure is None:
@@ -107,6 +110,7 @@ class Recorder:
                 if time.monotonic() >= next_flush_s:
                     self._write(log, self._health(log.newest_ns, self._file))
                     log.flush()
+                    self._is_begun.set()
                     next_flush_s = time.monotonic() + _FLUSH_PERIOD_S
             log.flush()
             self._write(log, self._health(log.newest_ns, self._file))  # once more, of the whole log
@@ -114,6 +118,7 @@ class Recorder:
         except Exception as error:
             self._fault = f"The log {self.path} was given up: {type(error).__name__}: {error}."
         finally:
+            self._is_begun.set()
             self._file.close()
 
     def _health(self, t_ns: int, file: LogFile) -> LogHealth:
