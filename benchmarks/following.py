@@ -18,9 +18,10 @@ from pathlib import Path
 import numpy as np
 
 from drivers.clock import NS_PER_S
-from mission.log.measures import nearest_on_axis
+from mission.log.measures import nearest_on_axis, true_axis
 from mission.log.reader import Flight, read_flight
-from mission.log.summary import summarise, task_spans, true_axis
+from mission.log.summary import summarise
+from mission.log.task_spans import task_spans
 from mission.plan import FollowLines, MissionPlan
 from mission.plan_file import read_mission
 from mission.simulated.scenario import Scenario

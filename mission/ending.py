@@ -18,7 +18,7 @@ from mission.log.errors import LogError
 if TYPE_CHECKING:
     from drivers.mcap_stream import Damage
     from mission.flight import FlightOutcome
-    from mission.log.summary import FlightReport
+    from mission.log.flight_report import FlightReport
     from mission.plan_file import MissionFile
     from mission.simulated.aftermath import Aftermath
     from mission.simulated.simulation import World
@@ -72,7 +72,7 @@ def read_report(log: Path) -> "FlightReport":
 
 def print_report(report: "FlightReport", *, as_json: bool) -> None:
     """Print a report, for people or programs."""
-    from mission.log.summary import to_json
+    from mission.log.flight_report import to_json
 
     if as_json:
         typer.echo(json.dumps(to_json(report)))
@@ -102,7 +102,7 @@ def finish(outcome: "FlightOutcome", *, as_json: bool, aftermath: "Aftermath | N
     page = _write_page(outcome.log, report) if report.tasks and aftermath is not None else None
     contact = None if aftermath is None else aftermath.contact
     if as_json:
-        from mission.log.summary import to_json
+        from mission.log.flight_report import to_json
 
         extra = {"log": str(outcome.log), "picture": _text(picture), "page": _text(page)}
         typer.echo(json.dumps(to_json(report) | extra | ({} if aftermath is None else aftermath.to_json())))

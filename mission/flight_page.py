@@ -4,9 +4,9 @@ import contextlib
 from pathlib import Path
 
 from mission.log.errors import LogError
+from mission.log.flight_report import FlightReport
 from mission.log.page.page import Ground, flight_page
 from mission.log.reader import Flight, read_flight
-from mission.log.summary import FlightReport
 
 
 class PageError(Exception):

@@ -7,7 +7,7 @@ from typing import Any
 
 from mission.compare.circumstances import Circumstances
 from mission.compare.figures import Figures, TaskPair, figures_of, pair_tasks
-from mission.log.summary import FlightReport
+from mission.log.flight_report import FlightReport
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,7 +4,7 @@ import difflib
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from mission.log.summary import FlightReport, TaskSummary
+from mission.log.flight_report import FlightReport, TaskSummary
 
 Figures = dict[str, float | None]
 

@@ -13,7 +13,7 @@ from mission.log.page.curves import listed
 from mission.log.page.page import fill
 from mission.log.page.thinning import evenly
 from mission.log.reader import Flight
-from mission.log.summary import FOLLOW_TASK, task_spans
+from mission.log.task_spans import FOLLOW_TASK, task_spans
 
 _TRACK_POINTS = 2_000
 _LEG_POINTS = 1_000

@@ -13,7 +13,7 @@ from mission.export.frames import photographs
 from mission.export.poses import Floats, Track, heading_deg
 from mission.geodesy import points_at
 from mission.log.reader import Flight, read_flight
-from mission.log.summary import FOLLOW_TASK, TaskSpan, task_spans
+from mission.log.task_spans import FOLLOW_TASK, TaskSpan, task_spans
 from mission.log.wording import words_of
 
 Facts = dict[str, str | float]

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from mission.export.errors import ExportError
 from mission.log.reader import Flight, read_images
-from mission.log.summary import task_spans
+from mission.log.task_spans import task_spans
 
 
 @dataclass(frozen=True, slots=True)

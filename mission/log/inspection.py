@@ -5,8 +5,10 @@ from dataclasses import replace
 from drivers.clock import NS_PER_S
 from mission.log.blame.blame import DEFAULT_LIMITS, find_excursions
 from mission.log.blame.records import Excursion, Kind, Limits
+from mission.log.flight_report import ExcursionSummary, FlightReport
 from mission.log.reader import Flight
-from mission.log.summary import ExcursionSummary, FlightReport, flight_start_ns, summarise
+from mission.log.summary import summarise
+from mission.log.task_spans import flight_start_ns
 
 
 def inspect_flight(flight: Flight, limits: Limits = DEFAULT_LIMITS) -> FlightReport:

@@ -4,6 +4,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.clock import NS_PER_S
+from mission.records import TrueLine
 
 Floats = NDArray[np.float64]
 
@@ -52,3 +53,8 @@ def offboard_gaps_s(times_ns: NDArray[np.int64], windows: list[tuple[int, int]])
             gaps_s.append(np.diff(np.concatenate(phase).astype(np.float64) / NS_PER_S))
             phase = []
     return np.concatenate(gaps_s)
+
+
+def true_axis(line: TrueLine) -> Floats:
+    """Return the line's axis as an array (m, 2) of north, east [m]."""
+    return np.array(line.axis_ne_m, dtype=np.float64).reshape(-1, 2)

@@ -7,10 +7,11 @@ import numpy as np
 
 from drivers.clock import NS_PER_S
 from mission.log.canvas import ACCENT, BAD, DIM_INK, GOOD, PANEL, SHADOW, Align, Box, Canvas, Color, Image
-from mission.log.measures import nearest_on_axis
+from mission.log.flight_report import FlightReport
+from mission.log.measures import nearest_on_axis, true_axis
 from mission.log.reader import Flight
 from mission.log.strip_chart import Strip, draw_strip
-from mission.log.summary import FOLLOW_TASK, FlightReport, flight_start_ns, true_axis
+from mission.log.task_spans import FOLLOW_TASK, flight_start_ns
 from mission.log.track_map import MapBackground, MapView, draw_map, map_view
 from mission.log.wording import counted
 from mission.records import Result

@@ -25,8 +25,9 @@ class Recorder:
     """Records a flight; a context manager, which opens the file and closes it.
 
     Entering raises LogError when the file cannot be made (it must not exist yet), and waits until the mission is on the
-    disk: whenever the program is killed then, the log opens. From then on no method raises or waits: when the disk will not take more, `failure` says so in a sentence and the flight goes on. `clock` ties flight
-    time to Unix time once, at the start, which `mission` keeps; `metadata` is kept beside the mission file.
+    disk: whenever the program is killed then, the log opens. From then on no method raises or waits: when the disk will
+    not take more, `failure` says so in a sentence and the flight goes on. `clock` ties flight time to Unix time once,
+    at the start, which `mission` keeps; `metadata` is kept beside the mission file.
     """
 
     def __init__(

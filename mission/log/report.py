@@ -7,8 +7,9 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
+from mission.log.flight_report import EventSummary, ExcursionSummary, FlightReport, TaskSummary
 from mission.log.paper import Part, put, table
-from mission.log.summary import UNFINISHED, EventSummary, ExcursionSummary, FlightReport, TaskSummary
+from mission.log.task_spans import UNFINISHED
 from mission.log.wording import counted, duration, with_unit, words_of
 from mission.records import Result, Severity
 

@@ -1,201 +1,31 @@
 """Work out from a flight's records what happened and how well it was flown."""
 
 from collections import Counter
-from dataclasses import asdict, dataclass
-from itertools import zip_longest
-from typing import Any
 
 import numpy as np
 
 from drivers.clock import NS_PER_S
 from mission.log.damage import words_of_damage
-from mission.log.measures import Floats, line_fit_distances_m, nearest_on_axis, offboard_gaps_s
+from mission.log.flight_report import (
+    EventSummary,
+    FlightReport,
+    LandingSummary,
+    LateralSummary,
+    LegSummary,
+    Percentiles,
+    PreflightSummary,
+    SetpointSummary,
+    StageSummary,
+    TaskSummary,
+    VisionSummary,
+    YawSummary,
+)
+from mission.log.measures import Floats, line_fit_distances_m, nearest_on_axis, offboard_gaps_s, true_axis
 from mission.log.reader import Flight
-from mission.log.wording import times_since, words_of
-from mission.records import CheckResult, Result, TaskEnded, TrueLine
+from mission.log.task_spans import FOLLOW_TASK, UNFINISHED, TaskSpan, flight_start_ns, stages, task_spans
+from mission.log.wording import words_of
+from mission.records import CheckResult, Result
 from vision.records import Track, wrap_line_angle_rad
-
-FOLLOW_TASK = "follow_lines"
-UNFINISHED = "unfinished"
-REJOINING_EVENT = "rejoining"
-
-_LEAST_STAGE_NS = NS_PER_S // 2  # who takes the vehicle over ends the flight at once: nothing comes after that
-
-
-@dataclass(frozen=True, slots=True)
-class TaskSpan:
-    """A task as flown, flight time [ns]; one that the log does not see end has no `end_ns`."""
-
-    task: str
-    start_ns: int
-    end_ns: int | None
-    result: str
-    reason: str
-
-
-@dataclass(frozen=True, slots=True)
-class TaskSummary:
-    """A task as flown; times [s] from the flight's start."""
-
-    task: str
-    start_s: float
-    end_s: float | None
-    result: str
-    reason: str
-
-
-@dataclass(frozen=True, slots=True)
-class StageSummary:
-    """A stretch outside the tasks, as going down after one that failed; times [s] from the flight's start."""
-
-    name: str
-    start_s: float
-    end_s: float
-
-
-@dataclass(frozen=True, slots=True)
-class LegSummary:
-    """How straight the line was followed: distances [m] of the positions to the straight line that fits them best."""
-
-    task: str
-    n_points: int
-    avg_error_m: float
-    p95_error_m: float
-
-
-@dataclass(frozen=True, slots=True)
-class LateralSummary:
-    """The true horizontal distance [m] from the line's axis while following it."""
-
-    mean_m: float
-    p95_m: float
-    max_m: float
-
-
-@dataclass(frozen=True, slots=True)
-class YawSummary:
-    """The true angle [deg] between heading and line while following it, without sign."""
-
-    median_deg: float
-    p95_deg: float
-
-
-@dataclass(frozen=True, slots=True)
-class Percentiles:
-    """The median and two upper percentiles."""
-
-    p50: float
-    p95: float
-    p99: float
-
-
-@dataclass(frozen=True, slots=True)
-class VisionSummary:
-    """How many frames vision worked on, in how many it saw a line, and how old its news was [ms].
-
-    `doubtful` counts the frames of a tracked line that showed none, or one elsewhere; `troubles` those that were dark,
-    frozen and so on, by the name of the trouble.
-    """
-
-    frames: int
-    estimates: int
-    doubtful: int
-    troubles: dict[str, int]
-    latency_ms: Percentiles | None
-
-
-@dataclass(frozen=True, slots=True)
-class SetpointSummary:
-    """How steadily setpoints were sent while offboard ran; None when fewer than two were."""
-
-    rate_hz: float | None
-    max_gap_ms: float | None
-
-
-@dataclass(frozen=True, slots=True)
-class LandingSummary:
-    """Where the flight ended: horizontal distance [m] from its start, and whether the motors were off."""
-
-    distance_m: float
-    is_disarmed: bool
-
-
-@dataclass(frozen=True, slots=True)
-class PreflightSummary:
-    """How many checks there were before arming, and what those said that were not fine."""
-
-    n_checks: int
-    warnings: tuple[str, ...]
-    failures: tuple[str, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class EventSummary:
-    """An event; `t_s` [s] from the flight's start."""
-
-    t_s: float
-    name: str
-    severity: str
-    message: str
-    reaction: str
-
-
-@dataclass(frozen=True, slots=True)
-class ExcursionSummary:
-    """Something that went beyond its limit, and whose fault it was (mission/log/blame/records.py); `t` [s]."""
-
-    kind: str
-    task: str
-    start_s: float
-    end_s: float
-    peak: float
-    unit: str
-    culprit: str
-    fault: str
-    shares: dict[str, float]
-    evidence: tuple[str, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class FlightReport:
-    """A flight in figures. Times [s] are since the flight's start (`flight_start_ns`).
-
-    `lateral` and `yaw_error` need ground truth, which only a simulated flight has. `excursions` are empty where nobody
-    looked for them (mission/log/inspection.py does). `damage` says in a sentence what of the log could not be read,
-    `ended_in` names the task in which a mission ended that was not completed; `stages` are what was flown outside the
-    tasks.
-    """
-
-    mission: str
-    result: str
-    reason: str
-    is_truncated: bool
-    duration_s: float
-    preflight: PreflightSummary
-    tasks: tuple[TaskSummary, ...]
-    legs: tuple[LegSummary, ...]
-    lateral: LateralSummary | None
-    yaw_error: YawSummary | None
-    vision: VisionSummary
-    setpoints: SetpointSummary
-    landing: LandingSummary | None
-    events: tuple[EventSummary, ...]
-    excursions: tuple[ExcursionSummary, ...] = ()
-    damage: str | None = None
-    ended_in: str | None = None
-    stages: tuple[StageSummary, ...] = ()
-
-    @property
-    def headline(self) -> str:
-        """How the flight ended, and in which task where it was not completed: `timed out in align`."""
-        return words_of(self.result) + ("" if self.ended_in is None else f" in {words_of(self.ended_in)}")
-
-    @property
-    def times_since(self) -> str:
-        """What all times are counted from."""
-        if not self.tasks:
-            return "the log's start"
-        return times_since(self.tasks[0].task)
 
 
 def summarise(flight: Flight) -> FlightReport:
@@ -244,59 +74,9 @@ def summarise(flight: Flight) -> FlightReport:
         ended_in=spans[-1].task if spans and spans[-1].result != Result.COMPLETED else None,
         stages=tuple(
             StageSummary(name, since_start_s(start_ns), since_start_s(stage_end_ns))
-            for name, start_ns, stage_end_ns in _stages(flight, spans, end_ns)
+            for name, start_ns, stage_end_ns in stages(flight, spans, end_ns)
         ),
     )
-
-
-def flight_start_ns(flight: Flight) -> int:
-    """When the first task began; the log's start where none did. Getting ready before it is not flight."""
-    return flight.tasks_started[0].t_ns if flight.tasks_started else flight.mission.start_ns
-
-
-def to_json(report: FlightReport) -> dict[str, Any]:
-    """Turn a report into plain dicts and lists, ready for json.dump; keys are the records' fields."""
-    return {key: list(value) if isinstance(value, tuple) else value for key, value in asdict(report).items()}
-
-
-def task_spans(flight: Flight) -> tuple[TaskSpan, ...]:
-    """Pair each task's start with its end, in the order flown.
-
-    One whose end the log lacks ended by when the next one began, if one did: that part of the log is damaged.
-    """
-    unpaired: list[TaskEnded] = list(flight.tasks_ended)
-    spans = []
-    for started, following in zip_longest(flight.tasks_started, flight.tasks_started[1:]):
-        ended = next((end for end in unpaired if end.index == started.index and end.t_ns >= started.t_ns), None)
-        if ended is None and following is not None:
-            why = "Its end stood in a part of the log that is damaged."
-            spans.append(TaskSpan(started.task, started.t_ns, following.t_ns, UNFINISHED, why))
-        elif ended is None:
-            spans.append(TaskSpan(started.task, started.t_ns, None, UNFINISHED, "The log breaks off before its end."))
-        else:
-            unpaired.remove(ended)
-            spans.append(TaskSpan(started.task, started.t_ns, ended.t_ns, str(ended.result), ended.reason))
-    return tuple(spans)
-
-
-def _stages(flight: Flight, spans: tuple[TaskSpan, ...], end_ns: int) -> list[tuple[str, int, int]]:
-    """What was flown before the first task, and from the end of one that was not completed to the flight's end."""
-    if not spans:
-        return []
-    stages = []
-    rejoining = next((event for event in flight.events if event.name == REJOINING_EVENT), None)
-    if rejoining is not None:  # a mission that is resumed flies to where it was interrupted first
-        later_ns = [span.start_ns for span in spans if span.start_ns > rejoining.t_ns]
-        stages.append(("rejoining", rejoining.t_ns, min(later_ns, default=end_ns)))
-    last = spans[-1]
-    if last.end_ns is not None and last.result != Result.COMPLETED and end_ns - last.end_ns >= _LEAST_STAGE_NS:
-        stages.append(("going down", last.end_ns, end_ns))
-    return stages
-
-
-def true_axis(line: TrueLine) -> Floats:
-    """Return the line's axis as an array (m, 2) of north, east [m]."""
-    return np.array(line.axis_ne_m, dtype=np.float64).reshape(-1, 2)
 
 
 def _preflight(flight: Flight) -> PreflightSummary:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from mission.autopilot import VehicleState
 from mission.log.canvas import ACCENT, DIM_INK, INK, SHADOW, Align, Box, Canvas, Color, Image
 from mission.log.reader import Flight
-from mission.log.summary import task_spans
+from mission.log.task_spans import task_spans
 from mission.log.wording import words_of
 from mission.records import TruePose
 

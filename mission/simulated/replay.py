@@ -13,7 +13,7 @@ from drivers.camera.camera import Intrinsics
 from drivers.clock import NS_PER_S
 from mission.log.canvas import ACCENT, INK, Box, Canvas
 from mission.log.reader import Flight
-from mission.log.summary import TaskSpan, task_spans
+from mission.log.task_spans import TaskSpan, task_spans
 from mission.log.track_map import MapView, map_view, task_color
 from mission.log.wording import words_of
 from mission.simulated.pictures import MOUNTS, PicturesError, picture_camera, scaled

@@ -15,9 +15,9 @@ from mission.compare.conditions import ConditionError, parse_condition
 from mission.compare.figure_words import change_words, label_of, value_words
 from mission.compare.figures import figures_of, pair_tasks
 from mission.ending import EXIT_BAD_INPUT, EXIT_DIFFERENT, EXIT_FAILED_FILE
+from mission.log.flight_report import TaskSummary
 from mission.log.inspection import inspect_flight
 from mission.log.reader import Flight, read_flight
-from mission.log.summary import TaskSummary
 from mission.records import TaskEnded, TaskStarted, TruePose
 from tests.log.synthetic_flight import fly, write_log
 from tests.support.command_line import lineflight

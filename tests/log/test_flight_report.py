@@ -14,10 +14,11 @@ from hypothesis.extra.numpy import arrays
 from rich.console import Console
 
 from drivers.clock import NS_PER_S
+from mission.log.flight_report import FlightReport, PreflightSummary, to_json
 from mission.log.measures import line_fit_distances_m, nearest_on_axis, offboard_gaps_s
 from mission.log.reader import Flight, read_flight
 from mission.log.report import print_report
-from mission.log.summary import FlightReport, PreflightSummary, summarise, to_json
+from mission.log.summary import summarise
 from mission.log.wording import counted
 from mission.records import CheckResult, Event, MissionEnded, PreflightCheck, Result, Severity, TaskEnded, TruePose
 from tests.log.synthetic_flight import START_NS, SWAY_M, TASKS, fly, write_log

@@ -28,7 +28,7 @@ from mission.log.page.frames import page_frames
 from mission.log.page.page import flight_page
 from mission.log.page.thinning import evenly, extremes
 from mission.log.reader import Flight, read_flight
-from mission.log.summary import flight_start_ns
+from mission.log.task_spans import flight_start_ns
 from tests.log.synthetic_flight import LINE_NORTH_M, START_NS, fly, write_log
 
 

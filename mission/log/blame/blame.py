@@ -12,7 +12,7 @@ from mission.log.blame.records import Excursion, Limits
 from mission.log.blame.signals import knowledge_of, motion_of
 from mission.log.blame.tilt import tilted
 from mission.log.reader import Flight
-from mission.log.summary import FOLLOW_TASK, task_spans
+from mission.log.task_spans import FOLLOW_TASK, task_spans
 
 DEFAULT_LIMITS = Limits()
 

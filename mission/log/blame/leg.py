@@ -12,7 +12,7 @@ from mission.log.blame.lag import ImageLag, image_lag, line_slope
 from mission.log.blame.signals import Knowledge, Lateral, Motion, lateral_of
 from mission.log.imported import ImportedActuators
 from mission.log.reader import Flight
-from mission.log.summary import TaskSpan
+from mission.log.task_spans import TaskSpan
 from vision.records import VisionReport
 
 Floats = NDArray[np.float64]

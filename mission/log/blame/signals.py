@@ -6,9 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from drivers.clock import NS_PER_S
-from mission.log.measures import nearest_on_axis
+from mission.log.measures import nearest_on_axis, true_axis
 from mission.log.reader import Flight
-from mission.log.summary import true_axis
 
 Floats = NDArray[np.float64]
 Times = NDArray[np.int64]

@@ -9,7 +9,7 @@ from drivers.clock import NS_PER_S
 from mission.log.blame.records import Culprit, Excursion, Fault, Kind, Limits
 from mission.log.blame.signals import Floats, Motion, Times
 from mission.log.blame.spans import spans
-from mission.log.summary import TaskSpan
+from mission.log.task_spans import TaskSpan
 
 _BALANCED = 0.5  # share of its thrust's level part that the air has to take up
 _FAST_M_S = 3.0  # over the ground, the way it leans

@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from drivers.clock import NS_PER_S
 from mission.log.blame.signals import Lateral, Motion, knowledge_of, lateral_of
-from mission.log.measures import nearest_on_axis
+from mission.log.measures import nearest_on_axis, true_axis
 from mission.log.page.thinning import evenly, extremes
 from mission.log.reader import Flight
-from mission.log.summary import FOLLOW_TASK, task_spans, true_axis
+from mission.log.task_spans import FOLLOW_TASK, task_spans
 
 Floats = NDArray[np.float64]
 Seconds = Callable[[Sequence[int]], Floats]

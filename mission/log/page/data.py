@@ -9,10 +9,11 @@ from numpy.typing import NDArray
 from drivers.clock import NS_PER_S
 from mission.log.blame.signals import Motion, motion_of
 from mission.log.circumstances import flown_with
+from mission.log.flight_report import FlightReport, to_json
 from mission.log.page.curves import flight_curves, listed
 from mission.log.page.thinning import evenly
 from mission.log.reader import Flight
-from mission.log.summary import FlightReport, flight_start_ns, to_json
+from mission.log.task_spans import flight_start_ns
 from mission.log.wording import counted
 from mission.records import LineFix
 

@@ -7,10 +7,11 @@ import json
 from dataclasses import dataclass
 from typing import Any
 
+from mission.log.flight_report import FlightReport
 from mission.log.page.data import page_data
 from mission.log.page.frames import page_frames
 from mission.log.reader import Flight
-from mission.log.summary import FlightReport, flight_start_ns
+from mission.log.task_spans import flight_start_ns
 
 
 @dataclass(frozen=True, slots=True)
