@@ -15,6 +15,7 @@ from mission.simulated.simulation import free_udp_port
 from tests.replay.own_estimates import distance_m, replay_own_estimates
 from tests.support.careless import check_contact_in_log, write_careless_mission
 from tests.support.command_line import ROOT, lineflight, lineflight_stopped
+from tests.support.short_mission import short_mission
 
 pytestmark = pytest.mark.real_time
 
@@ -102,25 +103,11 @@ def test_run_without_a_vehicle_is_not_ready(tmp_path: Path) -> None:
     assert "Traceback" not in ran.err
 
 
-WIDE_LENS_MISSION = """\
-version: 1
-name: wide_lens
-tasks:
-  - {task: takeoff, altitude_m: 5}
-  - {task: ascend, altitude_m: 16}
-  - {task: move_until}
-  - {task: align, turn: right}
-  - {task: follow_lines, distance_m: 12}
-  - {task: return}
-camera: {calibration: lens.yaml}
-"""
-
-
 def test_a_lens_that_bends_the_line_is_corrected_in_flight(tmp_path: Path) -> None:
     """The simulated camera has the calibrated lens; without the correction it would lose the line (docs/decisions)."""
     lens = Intrinsics(640, 480, 381.4, 381.4, 319.5, 239.5, (-0.24, 0.05, 0.0, 0.0, 0.0))
     write_calibration(tmp_path / "lens.yaml", lens, 0.2, "a test")
-    (tmp_path / "mission.yaml").write_text(WIDE_LENS_MISSION)
+    (tmp_path / "mission.yaml").write_text(short_mission("camera: {calibration: lens.yaml}"))
     ran = lineflight("dry-run", tmp_path / "mission.yaml", "--speed", "2", "--log", tmp_path, "--json")
     assert ran.code == 0, ran.err
     assert ran.json["result"] == "completed"

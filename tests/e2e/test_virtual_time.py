@@ -13,20 +13,9 @@ from mission.simulated.scenario import Scenario
 from mission.simulated.virtual_flight import fly_virtually
 from tests.support.careless import check_contact_in_log, write_careless_mission
 from tests.support.command_line import lineflight
+from tests.support.short_mission import short_mission
 
-SHORT_MISSION = """\
-version: 1
-name: short
-tasks:
-  - {task: takeoff, altitude_m: 5}
-  - {task: ascend, altitude_m: 16}
-  - {task: move_until}
-  - {task: align, turn: right}
-  - {task: follow_lines, distance_m: 12}
-  - {task: return}
-camera: {rate_hz: 15}
-safety: {line_height_m: 10.3}
-"""
+SHORT_MISSION = short_mission("camera: {rate_hz: 15}\nsafety: {line_height_m: 10.3}")
 
 
 def fly(folder: Path, scenario: Scenario) -> tuple[Flight, Aftermath, Result]:

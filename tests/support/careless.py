@@ -5,20 +5,10 @@ from pathlib import Path
 from mission.log.reader import read_flight
 from mission.records import Severity
 from tests.support.command_line import lineflight
+from tests.support.short_mission import short_mission
 
 # Without the line's height nobody knows that it lands there.
-MISSION = """\
-version: 1
-name: careless
-tasks:
-  - {task: takeoff, altitude_m: 5}
-  - {task: ascend, altitude_m: 16}
-  - {task: move_until}
-  - {task: align, turn: right}
-  - {task: follow_lines, distance_m: 12}
-  - {task: land}
-camera: {rate_hz: 15}
-"""
+MISSION = short_mission("camera: {rate_hz: 15}", end="land")
 
 
 def write_careless_mission(folder: Path) -> Path:
