@@ -52,7 +52,7 @@ def _numbered(found: Table, comparison: Comparison, justify: str) -> None:
 
 
 def _circumstances_table(comparison: Comparison) -> Table:
-    found = table("Flown with other")
+    found = table("What they were flown with differs")
     found.add_column("", no_wrap=True)
     _numbered(found, comparison, "left")
     for name, values in comparison.circumstances.shown.items():
