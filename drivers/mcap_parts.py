@@ -39,6 +39,7 @@ _LANDMARK = re.compile(
     re.DOTALL,
 )
 _WINDOW_BYTES = 1 << 20
+_PRIVATE = 0x80  # and above: the specification leaves these opcodes to applications
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,7 +76,7 @@ def parts(file: BinaryIO) -> Iterator[Part]:
         yield Part(opcode, _read(file, at, length))
         at += length
         if after is not None:
-            if after != MAGIC:
+            if not after.startswith(MAGIC):
                 yield Part(None, b"")
             return
 
@@ -96,6 +97,9 @@ def _header(file: BinaryIO, at: int, size: int) -> tuple[int, int] | None:
     opcode, length = RECORD_HEADER.unpack(head)
     at += RECORD_HEADER.size
     end = at + length
+    if opcode >= _PRIVATE and end < size:  # another tool's own: to be passed over, where it is a record at all
+        following = _read(file, end, 1)
+        return (opcode, length) if following[0] in _LAYOUT and _header(file, end, size) is not None else None
     if opcode not in _LAYOUT or end > size:
         return None
     for field in _LAYOUT[opcode]:

@@ -65,6 +65,7 @@ class McapFile:
         self._summary: Summary | None = None
         self._topics: dict[int, str] = {}
         self._n_sound = self._n_unsound = self._n_nameless = 0
+        self._is_chunked = True
         self._is_flawed = False  # in a place that holds none of the messages
         self._holes_ns: list[tuple[int, int]] = []
         self._is_all_known = True
@@ -75,7 +76,7 @@ class McapFile:
     def damage(self) -> Damage | None:
         """What could not be read; None where all could, up to where the file was cut off."""
         n_parts = self._n_sound + self._n_unsound
-        if self._summary is not None and self._summary.n_parts is not None:
+        if self._is_chunked and self._summary is not None and self._summary.n_parts is not None:
             n_parts = max(self._summary.n_parts, self._n_sound)
         n_skipped = n_parts - self._n_sound
         if not (n_skipped or self._n_unsound or self._n_nameless or self._is_flawed):
@@ -162,6 +163,7 @@ class McapFile:
                 yield part.opcode, content
             else:
                 self.is_closed = self.is_closed or part.opcode == Opcode.FOOTER
+                self._is_chunked = self._is_chunked and part.opcode != Opcode.MESSAGE
                 if part.opcode == Opcode.MESSAGE or self._is_told(part):
                     yield part.opcode, part.content
 

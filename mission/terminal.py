@@ -27,12 +27,12 @@ class _Asides(io.TextIOWrapper):
     """Standard error: what it does not take is lost, and changes nothing about how the command ends."""
 
     def write(self, text: str, /) -> int:
-        with _swallowed():
+        with contextlib.suppress(OSError):
             return super().write(text)
         return len(text)
 
     def flush(self) -> None:
-        with _swallowed():
+        with contextlib.suppress(OSError):
             super().flush()
 
 
@@ -72,13 +72,3 @@ def _told() -> Iterator[None]:
         raise OutputLostError(
             f"The output could not be written ({error.strerror or error}); send it to where there is room."
         ) from error
-
-
-@contextlib.contextmanager
-def _swallowed() -> Iterator[None]:
-    try:
-        yield
-    except BrokenPipeError:
-        raise
-    except OSError:
-        pass

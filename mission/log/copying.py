@@ -131,8 +131,9 @@ class Copier:
         elif isinstance(record, Channel):
             if record.id not in self._channel_ids:
                 self._topics[record.id] = record.topic
+                schema_id = self._schema_ids.get(record.schema_id, 0)  # it may have stood in a damaged part
                 self._channel_ids[record.id] = writer.register_channel(
-                    record.topic, record.message_encoding, self._schema_ids[record.schema_id], record.metadata
+                    record.topic, record.message_encoding, schema_id, record.metadata
                 )
         elif self._is_new(record):
             if isinstance(record, Header):

@@ -14,7 +14,7 @@ from mission.log.task_spans import flight_start_ns
 def inspect_flight(flight: Flight, limits: Limits = DEFAULT_LIMITS) -> FlightReport:
     """Work out a flight's report, its excursions beyond `limits` with it.
 
-    Where the log is damaged, nobody is blamed for what was not seen there: `FlightReport.damage` tells of it.
+    Where the log is damaged, nobody is blamed for what stood there: `FlightReport.damage` tells of it.
     """
     start_ns = flight_start_ns(flight)
     return replace(
@@ -39,11 +39,10 @@ def inspect_flight(flight: Flight, limits: Limits = DEFAULT_LIMITS) -> FlightRep
 
 
 def _is_for_want_of_records(excursion: Excursion, flight: Flight) -> bool:
-    """Whether nothing was seen because the log has a hole there."""
-    if excursion.kind is not Kind.UNSEEN or flight.damage is None:
-        return False
-    offset_ns = flight.mission.unix_minus_flight_ns
-    return any(
-        begin_ns - offset_ns <= excursion.end_ns and excursion.start_ns <= end_ns - offset_ns
-        for begin_ns, end_ns in flight.damage.holes_ns
+    """Whether a hole in the log is all that it tells of, or most."""
+    lacking_ns = sum(
+        max(min(excursion.end_ns, end_ns) - max(excursion.start_ns, begin_ns), 0)
+        for begin_ns, end_ns in flight.holes_ns
     )
+    least_ns = 0 if excursion.kind is Kind.UNSEEN else (excursion.end_ns - excursion.start_ns) // 2
+    return lacking_ns > least_ns

@@ -1,5 +1,7 @@
 """How well a line was followed and setpoints were sent: pure arithmetic on positions and times."""
 
+from collections.abc import Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -37,11 +39,14 @@ def nearest_on_axis(points_ne_m: Floats, axis_ne_m: Floats) -> tuple[Floats, Flo
     return side * distances[each, piece], np.arctan2(steps[:, 1], steps[:, 0])[piece]
 
 
-def offboard_gaps_s(times_ns: NDArray[np.int64], windows: list[tuple[int, int]]) -> Floats:
+def offboard_gaps_s(
+    times_ns: NDArray[np.int64], windows: list[tuple[int, int]], holes_ns: Sequence[tuple[int, int]] = ()
+) -> Floats:
     """Measure the gaps [s] between consecutive setpoints, sent at `times_ns` (n,) int64, while offboard runs.
 
     Offboard runs through consecutive tasks, `windows` [ns] in the order flown, that each sent setpoints; a task that
-    sent none was flown by the autopilot itself, and the pause it makes is no gap.
+    sent none was flown by the autopilot itself, and the pause it makes is no gap. What was sent in `holes_ns` is not
+    known, and no gap either.
     """
     gaps_s = [np.empty(0)]
     phase: list[NDArray[np.int64]] = []
@@ -50,9 +55,16 @@ def offboard_gaps_s(times_ns: NDArray[np.int64], windows: list[tuple[int, int]])
         if sent_ns.size:
             phase.append(sent_ns)
         elif phase:
-            gaps_s.append(np.diff(np.concatenate(phase).astype(np.float64) / NS_PER_S))
+            gaps_s.append(_gaps_s(np.concatenate(phase), holes_ns))
             phase = []
     return np.concatenate(gaps_s)
+
+
+def _gaps_s(sent_ns: NDArray[np.int64], holes_ns: Sequence[tuple[int, int]]) -> Floats:
+    is_known = np.ones(len(sent_ns) - 1, dtype=np.bool_)
+    for begin_ns, end_ns in holes_ns:
+        is_known &= (sent_ns[1:] < begin_ns) | (sent_ns[:-1] > end_ns)
+    return np.asarray(np.diff(sent_ns).astype(np.float64)[is_known] / NS_PER_S)
 
 
 def true_axis(line: TrueLine) -> Floats:

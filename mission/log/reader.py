@@ -91,6 +91,14 @@ class Flight:
     damage: Damage | None = None
 
     @property
+    def holes_ns(self) -> tuple[tuple[int, int], ...]:
+        """From when to when [ns, flight] damaged parts of the log lie, in order, as far as known."""
+        if self.damage is None:
+            return ()
+        offset_ns = self.mission.unix_minus_flight_ns
+        return tuple(sorted((begin - offset_ns, end - offset_ns) for begin, end in self.damage.holes_ns))
+
+    @property
     def camera(self) -> Intrinsics | None:
         """The camera that the log's frames are from; None where the log does not tell. Raises LogError."""
         text = self.attachments.get("camera.json") or self.mission.metadata.get("camera_intrinsics")

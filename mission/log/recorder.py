@@ -11,6 +11,7 @@ from drivers.clock import Clock, ScaledClock
 from mission.autopilot import Setpoint
 from mission.log.backlog import Backlog
 from mission.log.disk import LogFile
+from mission.log.errors import LogError
 from mission.log.mcap_log import McapLog
 from mission.log.records import LoggedMission, LogHealth, SentSetpoint, StatusText
 
@@ -24,10 +25,10 @@ _CLOSE_TIMEOUT_S = 10.0
 class Recorder:
     """Records a flight; a context manager, which opens the file and closes it.
 
-    Entering raises LogError when the file cannot be made (it must not exist yet), and waits until the mission is on the
-    disk: whenever the program is killed then, the log opens. From then on no method raises or waits: when the disk will
-    not take more, `failure` says so in a sentence and the flight goes on. `clock` ties flight time to Unix time once,
-    at the start, which `mission` keeps; `metadata` is kept beside the mission file.
+    Entering raises LogError when the file cannot be made (it must not exist yet) or the disk does not take it, and
+    waits until the mission is on the disk: whenever the program is killed then, the log opens. From then on no method
+    raises or waits: when the disk will not take more, `failure` says so in a sentence and the flight goes on. `clock`
+    ties flight time to Unix time once, at the start, which `mission` keeps; `metadata` is kept beside the mission file.
     """
 
     def __init__(
@@ -87,7 +88,11 @@ class Recorder:
         self._file = LogFile(self.path)
         self._backlog.put(self.mission)
         self._thread.start()
-        self._is_begun.wait(_OPEN_TIMEOUT_S)
+        is_begun = self._is_begun.wait(_OPEN_TIMEOUT_S)
+        if not is_begun or self.failure is not None:
+            self._backlog.close()
+            why = self.failure or f"The disk did not take the log {self.path} within {_OPEN_TIMEOUT_S:g} s."
+            raise LogError(f"{why} Name a folder on another disk.")
         return self
 
     def __exit__(

@@ -33,6 +33,7 @@ def summarise(flight: Flight) -> FlightReport:
     spans = task_spans(flight)
     ended = flight.mission_ended
     end_ns = flight.end_ns if ended is None else ended.t_ns
+    is_completed = ended is not None and ended.result == Result.COMPLETED
 
     def since_start_s(t_ns: int) -> float:
         return (t_ns - flight_start_ns(flight)) / NS_PER_S
@@ -71,7 +72,7 @@ def summarise(flight: Flight) -> FlightReport:
             for event in flight.events
         ),
         damage=None if flight.damage is None else words_of_damage(flight.damage),
-        ended_in=spans[-1].task if spans and spans[-1].result != Result.COMPLETED else None,
+        ended_in=None if not spans or is_completed or spans[-1].result == Result.COMPLETED else spans[-1].task,
         stages=tuple(
             StageSummary(name, since_start_s(start_ns), since_start_s(stage_end_ns))
             for name, start_ns, stage_end_ns in stages(flight, spans, end_ns)
@@ -130,7 +131,8 @@ def _setpoints(flight: Flight, spans: tuple[TaskSpan, ...]) -> SetpointSummary:
     windows = [_span_window(span, flight.end_ns) for span in spans]
     ends_ns = [start_ns for start_ns, _ in windows[1:]] + [end_ns for _, end_ns in windows[-1:]]
     windows = [(start_ns, end_ns) for (start_ns, _), end_ns in zip(windows, ends_ns, strict=True)]
-    gaps_s = offboard_gaps_s(np.array([setpoint.t_ns for setpoint in flight.setpoints], dtype=np.int64), windows)
+    sent_ns = np.array([setpoint.t_ns for setpoint in flight.setpoints], dtype=np.int64)
+    gaps_s = offboard_gaps_s(sent_ns, windows, flight.holes_ns)
     if not gaps_s.size:
         return SetpointSummary(None, None)
     return SetpointSummary(rate_hz=float(gaps_s.size / gaps_s.sum()), max_gap_ms=float(gaps_s.max() * 1e3))

@@ -16,11 +16,14 @@ from drivers.clock import NS_PER_S
 from drivers.mcap_stream import open_messages
 from mission.log.blame.blame import find_excursions
 from mission.log.blame.records import Kind
+from mission.log.blame.signals import motion_of
 from mission.log.copying import write_copy
 from mission.log.damage import words_of_damage
 from mission.log.errors import LogError
 from mission.log.inspection import inspect_flight
+from mission.log.page.curves import flight_curves
 from mission.log.reader import Flight, find_damage, read_flight, read_images, stream_log
+from mission.log.task_spans import flight_start_ns
 from tests.log.synthetic_flight import fly, write_log
 from tests.support.command_line import lineflight
 
@@ -46,6 +49,10 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(scope="module")
 def places(log: Path) -> list[Place]:
+    return chunks_of(log)
+
+
+def chunks_of(log: Path) -> list[Place]:
     """Found by the mcap package, not by our own reader."""
     with log.open("rb") as file:
         summary = make_reader(file).get_summary()
@@ -234,3 +241,56 @@ def test_nobody_is_blamed_for_what_stood_in_a_damaged_part(tmp_path: Path) -> No
     flight = read_flight(path)
     assert Kind.UNSEEN in {excursion.kind for excursion in find_excursions(flight)}  # if one looks at records alone
     assert inspect_flight(flight).excursions == ()
+
+
+def test_no_damage_of_one_part_makes_a_flight_worse_than_it_was(tmp_path: Path) -> None:
+    """What began before a hole or ended in it is not taken for what came after."""
+    log, path = tmp_path / "a.mcap", tmp_path / "b.mcap"
+    assert write_log(log, list(fly(image_period_s=2.0))).failure is None
+    whole = inspect_flight(read_flight(log))
+    assert whole.lateral is not None
+    assert whole.setpoints.max_gap_ms is not None
+    n_lost = 0
+    for place in chunks_of(log):
+        damage_chunk(log, place, path)
+        flight = read_flight(path)
+        report = inspect_flight(flight)
+        n_lost += len(report.tasks) != len(whole.tasks) or any(task.result == "unfinished" for task in report.tasks)
+        assert report.excursions == whole.excursions
+        assert report.setpoints.max_gap_ms is not None
+        assert report.setpoints.max_gap_ms < 1.5 * whole.setpoints.max_gap_ms
+        assert report.lateral is None or report.lateral.max_m < 1.5 * whole.lateral.max_m
+        assert (report.ended_in is None) or report.result != "completed"
+        for curve in flight_curves(flight, motion_of(flight), flight_start_ns(flight)).values():
+            assert curve["t"] == sorted(curve["t"])
+    assert n_lost > 1
+
+
+def test_a_copy_of_a_cut_and_damaged_log_can_be_made(log: Path, places: list[Place], tmp_path: Path) -> None:
+    """A channel's schema may have stood in the damaged part, and no summary tells it again."""
+    for number, place in enumerate(places[:-1]):
+        path, copy = tmp_path / f"{number}.mcap", tmp_path / f"{number}-copy.mcap"
+        damage_chunk(log, place, path)
+        path.write_bytes(path.read_bytes()[: places[-1].end])
+        write_copy(path, copy, [], lambda _: None)
+        assert counted(copy) == counted(path)
+        assert find_damage(copy) == find_damage(path) is not None
+
+
+def test_what_another_tool_put_behind_the_log_damages_nothing(log: Path, tmp_path: Path) -> None:
+    path = tmp_path / "a.mcap"
+    for more in (b"x", bytes(4096)):
+        path.write_bytes(log.read_bytes() + more)
+        flight = read_flight(path)
+        assert flight.damage is None or flight.damage.n_skipped == 0
+        assert flight.states == read_flight(log).states
+
+
+def test_records_of_another_tool_are_passed_over(log: Path, places: list[Place], tmp_path: Path) -> None:
+    """The specification leaves opcodes from 0x80 on to applications."""
+    path, data = tmp_path / "a.mcap", log.read_bytes()
+    own = b"\x90" + (5).to_bytes(8, "little") + b"hello"
+    path.write_bytes(data[: places[1].begin] + own + data[places[1].begin :])
+    flight = read_flight(path)
+    assert flight.states == read_flight(log).states
+    assert flight.damage is None or flight.damage.n_skipped == 0

@@ -79,3 +79,12 @@ def test_a_full_disk_behind_a_file_is_a_sentence(log: Path, tmp_path: Path, comm
     assert "cannot be written (File too large)" in done.stderr
     assert "Traceback" not in done.stderr
     assert not target.exists()
+
+
+def test_a_reader_of_errors_that_has_gone_changes_no_exit_code(tmp_path: Path) -> None:
+    reader, writer = os.pipe()
+    os.close(reader)
+    try:
+        assert run(["inspect", str(tmp_path / "none.mcap")], subprocess.DEVNULL, writer)[0] == 2
+    finally:
+        os.close(writer)

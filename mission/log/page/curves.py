@@ -1,5 +1,6 @@
 """The curves of a flight's page: values over time, thinned for the eye."""
 
+import bisect
 import itertools
 import math
 from collections.abc import Callable, Sequence
@@ -79,7 +80,18 @@ def flight_curves(flight: Flight, motion: Motion, start_ns: int) -> dict[str, An
         curves["height_over_line_known"] = _curve(
             np.insert(times_s, gaps, times_s[gaps]), np.insert(depths_m, gaps, np.nan)
         )
+    holes_s = s([begin_ns + (end_ns - begin_ns) // 2 for begin_ns, end_ns in flight.holes_ns]).tolist()
+    for curve in curves.values():
+        _break(curve, holes_s)
     return {name: curve for name, curve in curves.items() if any(value is not None for value in curve["y"])}
+
+
+def _break(curve: dict[str, Any], holes_s: list[float]) -> None:
+    """Draw nothing across what a damaged log lacks: nobody knows what was there."""
+    for hole_s in holes_s:
+        at = bisect.bisect(curve["t"], hole_s)
+        curve["t"].insert(at, round(hole_s, 3))
+        curve["y"].insert(at, None)
 
 
 def _lateral_curves(flight: Flight, motion: Motion, t_s: Floats) -> dict[str, Any]:

@@ -111,7 +111,7 @@
         make("ul", {}, ...trouble.evidence.map((line) => make("li", {}, line)))));
     }
     if (!report.excursions.length && report.result === "completed" && report.tasks.some((task) => task.task === "follow_lines")) {
-      $("blame").append(make("p", { class: "dim" }, "Nothing went beyond its limits while the line was followed."));
+      $("blame").append(make("p", { class: "dim" }, `Nothing went beyond its limits while the line was followed${report.damage ? ", in what the log still holds" : ""}.`));
     }
   }
 
