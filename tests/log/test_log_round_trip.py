@@ -296,6 +296,27 @@ def test_a_full_disk_is_a_failure_to_look_at_and_no_exception(tmp_path: Path) ->
     assert 0 < len(flight.states) < 2_000
 
 
+NO_ROOM = """
+import resource, sys
+from pathlib import Path
+from mission.log.errors import LogError
+from mission.log.recorder import Recorder
+resource.setrlimit(resource.RLIMIT_FSIZE, (0, 0))
+try:
+    Recorder(Path(sys.argv[1]), mission_text="", mission_name="m", metadata={}).__enter__()
+except LogError as error:
+    print(error)
+"""
+
+
+def test_a_disk_that_takes_nothing_is_refused_before_the_flight(tmp_path: Path) -> None:
+    path = tmp_path / "none.mcap"
+    command = [sys.executable, "-W", "error", "-c", NO_ROOM, str(path)]
+    done = subprocess.run(command, env=child_environment(), capture_output=True, text=True, check=True)
+    assert done.stdout.startswith(f"The log {path} cannot be written any more (File too large)")
+    assert done.stdout.endswith("Name a folder on another disk.\n")
+
+
 def test_a_record_that_cannot_be_logged_is_a_failure_and_the_rest_is_kept(tmp_path: Path) -> None:
     event = Event(START_NS, "x", Severity.INFO, "y")
     recorder = write_log(tmp_path / "a.mcap", [(0, object()), (0, event)])
