@@ -73,7 +73,8 @@ class Watch:
     def _print_checks(self) -> None:
         while not self._checks.empty():
             check = self._checks.get()
-            text = Text.assemble((f"       {check.result:<14}", _STYLES[check.result]), check.line)
+            label, style = ("not yet", "yellow") if check.waits_for else (str(check.result), _STYLES[check.result])
+            text = Text.assemble((f"       {label:<14}", style), check.line)
             self._console.print(text, soft_wrap=True, highlight=False)
 
     def _print(self, progress: Progress) -> None:
@@ -94,5 +95,5 @@ class Watch:
         elif progress.height_m is not None and progress.distance_m is not None:
             line.append(f"{progress.height_m:5.1f} m up  {progress.distance_m:5.1f} m out", "cyan")
             if progress.heading_rad is not None:
-                line.append(f"  heading {math.degrees(progress.heading_rad) % 360:3.0f}", "cyan")
+                line.append(f"  heading {math.degrees(progress.heading_rad) % 360:3.0f}°", "cyan")
         return line

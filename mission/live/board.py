@@ -27,7 +27,7 @@ from vision.records import VisionReport
 _MAX_EVENTS = 100
 _MAX_POINTS = 2000
 _STEP_M = 0.3
-_CHATTER = "mavsdk DEBUG"  # it repeats what the autopilot said
+_CHATTER = "mavsdk "  # the library talks to developers: its words are in the log, and what matters becomes an event
 
 
 @dataclass(frozen=True, slots=True)

@@ -119,7 +119,7 @@ def test_events_are_bounded_and_without_chatter() -> None:
     board = Board()
     start = TaskStarted(START_NS, 0, "takeoff")
     words = [StatusText(START_NS + i * NS_PER_S, f"word {i}") for i in range(500)]
-    board.add(Batch(3, (start, *words, StatusText(START_NS, "mavsdk DEBUG: word 499"))), 0.0)
+    board.add(Batch(3, (start, *words, StatusText(START_NS, "mavsdk ERROR: Retrying failed"))), 0.0)
     state = board.state(0.0)
     assert [event["text"] for event in state["events"]] == [f"word {i}" for i in range(400, 500)]
     assert state["events"][-1]["t_s"] == 499.0
