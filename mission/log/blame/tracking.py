@@ -16,6 +16,8 @@ Floats = NDArray[np.float64]
 TILT_LIMIT_RAD = math.radians(38.0)
 """A vehicle that is tilted so far does what it can."""
 
+NO_SETPOINT_WORDS = ("No setpoint was sent meanwhile: the autopilot had nothing to fly to.",)
+
 _BEGUN = 0.25  # share of its peak where an excursion began
 _BEFORE_S = 2.0
 _SLOW = 0.1  # share of its greatest speed
@@ -25,8 +27,8 @@ _OWN_SHARE, _OWN_M = 0.5, 0.5  # of the way off the line, which a sound vehicle 
 def of_tracking(motion: Motion, lateral: Lateral, peak: int, side: float) -> tuple[Culprit, Fault, tuple[str, ...]]:
     """Who took the vehicle off its setpoint, to the side where `side` is 1 (right) or -1, up to the sample `peak`.
 
-    The setpoint itself, where it went away; else the air or the vehicle's own thrust, whichever gave it the larger
-    impulse while it gathered way.
+    At `peak` the setpoint has to be known. The setpoint itself did, where it went away; else the air or the vehicle's
+    own thrust, whichever gave it the larger impulse while it gathered way.
     """
     t_ns = motion.t_ns
     right = side * lateral.right[peak]
@@ -42,7 +44,9 @@ def of_tracking(motion: Motion, lateral: Lateral, peak: int, side: float) -> tup
     wanted_m_s2[earliest : peak + 1] = sound_m_s2 @ right
     off_m = float(np.nan_to_num(side * lateral.off_m[peak]))
     if excess_m[peak] < max(_OWN_M, _OWN_SHARE * min(off_m if off_m > 0.0 else math.inf, float(tracking_m[peak]))):
-        moved_m = float(-(motion.setpoint_m[peak, :2] - motion.setpoint_m[first, :2]) @ right)
+        sent_m = motion.setpoint_m[during, :2]
+        sent_m = sent_m[np.isfinite(sent_m).all(axis=1)]
+        moved_m = float((sent_m[0] - sent_m[-1]) @ right)
         sound = off_m - float(excess_m[peak])
         return Culprit.EXECUTIVE, Fault.SETPOINT, _moved_words(moved_m, sound, late_s)
     pushed = motion.push_m_s2 @ right
