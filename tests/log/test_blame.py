@@ -178,6 +178,18 @@ def test_what_a_log_lacks_does_not_stand_in_a_sentence_as_a_number(missing: str,
     assert n_told
 
 
+def test_a_setpoint_that_comes_back_faster_than_a_vehicle_follows_is_told_as_that(tmp_path: Path) -> None:
+    """It leaned against a gust; after it the vehicle swings over, while the setpoint is over the line again."""
+    gust = OneGust(random.Random("gust 6").uniform(1.5, 2.0))
+    flight = fly(tmp_path / "6.mcap", 6, lambda _: gust.begin(), gust)
+    for log in (flight, without_truth(flight)):
+        (swing,) = [one for one in find_excursions(log) if one.culprit is Culprit.EXECUTIVE]
+        assert swing.shares["executive"] < 0.0 < swing.shares["tracking"]
+        assert re.match(
+            r"The setpoint had gone 1\.\d\d m to the left of the line as told and came back", swing.evidence[0]
+        )
+
+
 class Misplaced:
     """An autopilot that takes itself to be `aside_m` to the right of where it is; its velocity is right."""
 
