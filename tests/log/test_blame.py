@@ -1,17 +1,20 @@
 """Blame by causing it: what was done to a flight is what its log says was done."""
 
 import asyncio
+import itertools
 import math
 import random
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
 
 from mission import guidance
-from mission.autopilot import Setpoint
+from mission.autopilot import Setpoint, VehicleState
 from mission.guidance import WorldLine
 from mission.log.blame.blame import find_excursions
 from mission.log.blame.records import Culprit, Fault, Kind
@@ -21,8 +24,10 @@ from mission.plan import MissionPlan, Rotate
 from mission.tasks import follow_lines
 from sitl.gust_front import GustFronts, one_minus_cosine
 from sitl.wind import Wind
+from tests.support.faulty_autopilot import FaultyAutopilot
 from tests.support.flights import LINE_HEADING_RAD, Cockpit
 from tests.support.logged_flight import Bend, fly_and_log
+from vision.records import VisionReport
 
 PLAN = MissionPlan.model_validate(
     yaml.safe_load(
@@ -152,6 +157,113 @@ def test_a_gust_is_blamed_on_the_wind(tmp_path: Path) -> None:
         gust = OneGust(random.Random(f"gust {seed}").uniform(1.5, 2.0))
         flights[seed] = fly(tmp_path / f"{seed}.mcap", seed, lambda _, gust=gust: gust.begin(), gust)
     check(flights, Culprit.WIND, Fault.PUSHED)
+
+
+@pytest.mark.parametrize("missing", ["setpoints", "states", "reports", "fixes"])
+def test_what_a_log_lacks_does_not_stand_in_a_sentence_as_a_number(missing: str, tmp_path: Path) -> None:
+    """A gust, and around it nothing of one stream: no figure is told of what nobody knows."""
+    gust = OneGust(1.8)
+    flight = fly(tmp_path / "1.mcap", 2, lambda _: gust.begin(), gust)
+    (off, *_) = [one for one in find_excursions(flight) if one.kind is Kind.OFF_LINE]
+    n_told = 0
+    for early_s, long_s in itertools.product((6.0, 3.0, 1.0, 0.5, 0.2, -0.1, -0.5), (1.5, 3.0, 6.0, 20.0)):
+        first_ns = off.start_ns - round(early_s * 1e9)
+        last_ns = first_ns + round(long_s * 1e9)
+        kept = tuple(one for one in getattr(flight, missing) if not first_ns < time_of(one) < last_ns)
+        for log in (replace(flight, **{missing: kept}), without_truth(replace(flight, **{missing: kept}))):
+            for one in find_excursions(log):
+                n_told += 1
+                assert math.isfinite(one.peak), one
+                assert not re.search(r"\b(nan|inf)\b", " ".join(one.evidence)), (early_s, long_s, one)
+    assert n_told
+
+
+def test_a_setpoint_that_comes_back_faster_than_a_vehicle_follows_is_told_as_that(tmp_path: Path) -> None:
+    """It leaned against a gust; after it the vehicle swings over, while the setpoint is over the line again."""
+    gust = OneGust(random.Random("gust 6").uniform(1.5, 2.0))
+    flight = fly(tmp_path / "6.mcap", 6, lambda _: gust.begin(), gust)
+    for log in (flight, without_truth(flight)):
+        (swing,) = [one for one in find_excursions(log) if one.culprit is Culprit.EXECUTIVE]
+        assert swing.shares["executive"] < 0.0 < swing.shares["tracking"]
+        assert re.match(
+            r"The setpoint had gone 1\.\d\d m to the left of the line as told and came back", swing.evidence[0]
+        )
+
+
+class Misplaced:
+    """An autopilot that takes itself to be `aside_m` to the right of where it is; its velocity is right."""
+
+    def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.aside_m = 0.0
+        state_of, send = FaultyAutopilot.state.fget, FaultyAutopilot.set_setpoint
+        assert state_of is not None
+
+        def state(autopilot: FaultyAutopilot) -> VehicleState | None:
+            told = state_of(autopilot)
+            return None if told is None else self._moved(told, self.aside_m)
+
+        async def set_setpoint(autopilot: FaultyAutopilot, setpoint: Setpoint) -> None:
+            await send(autopilot, self._moved(setpoint, -self.aside_m))
+
+        monkeypatch.setattr(FaultyAutopilot, "state", property(state))
+        monkeypatch.setattr(FaultyAutopilot, "set_setpoint", set_setpoint)
+
+    def drift(self, speed_m_s: float) -> None:
+        self.aside_m += 0.05 * speed_m_s
+        asyncio.get_running_loop().call_later(0.05, self.drift, speed_m_s)
+
+    @staticmethod
+    def _moved(told: Any, aside_m: float) -> Any:
+        north_m, east_m = -aside_m * math.sin(LINE_HEADING_RAD), aside_m * math.cos(LINE_HEADING_RAD)
+        return replace(told, north_m=told.north_m + north_m, east_m=told.east_m + east_m)
+
+
+@pytest.mark.parametrize("jump_m", [1.5, 2.5])
+def test_a_position_that_jumps_is_the_autopilots_and_neither_the_lines_nor_the_winds(
+    jump_m: float, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Vehicle and line stayed where they are; all that is told by the position went aside, the line as told, too."""
+    n_named = 0
+    for seed in SEEDS[:4]:
+        misplaced = Misplaced(monkeypatch)
+        side_m = either_side(random.Random(f"position {seed}"), jump_m, jump_m)
+        flight = fly(tmp_path / f"{seed}.mcap", seed, lambda _, m=misplaced, s=side_m: setattr(m, "aside_m", s))
+        monkeypatch.undo()
+        for log in (flight, without_truth(flight)):
+            found = find_excursions(log)
+            assert all((one.culprit, one.fault) == (Culprit.AUTOPILOT, Fault.POSITION) for one in found), (seed, found)
+            for one in found:
+                words = re.search(r"jumped by (\d\.\d\d) m to the (left|right)", one.evidence[0])
+                assert words is not None, one
+                assert float(words[1]) == pytest.approx(jump_m, abs=0.05)
+                assert words[2] == ("right" if side_m > 0.0 else "left")
+            n_named += bool(found)
+    assert n_named >= 7
+
+
+def test_a_position_that_drifts_has_not_jumped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As GPS does."""
+    for speed_m_s in (0.2, -0.5):
+        misplaced = Misplaced(monkeypatch)
+        flight = fly(tmp_path / f"{speed_m_s}.mcap", 3, lambda _, m=misplaced, v=speed_m_s: m.drift(v))
+        monkeypatch.undo()
+        assert abs(misplaced.aside_m) > 2.0
+        for log in (flight, without_truth(flight)):
+            assert all(one.fault is not Fault.POSITION for one in find_excursions(log))
+
+
+def test_a_gust_is_no_jump_of_the_position(tmp_path: Path) -> None:
+    for seed in SEEDS[:4]:
+        gust = OneGust(2.0)
+        flight = fly(tmp_path / f"{seed}.mcap", seed, lambda _, gust=gust: gust.begin(), gust)
+        for log in (flight, without_truth(flight)):
+            found = find_excursions(log)
+            assert found
+            assert all(one.fault is not Fault.POSITION for one in found), found
+
+
+def time_of(record: Any) -> int:
+    return int(record.t_capture_ns if isinstance(record, VisionReport) else record.t_ns)
 
 
 @pytest.mark.parametrize("act", [jump_for_a_while, turn_for_a_while])

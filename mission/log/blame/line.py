@@ -12,9 +12,10 @@ from mission.log.blame.following import delay_s
 from mission.log.blame.jump import jump_before, jump_words, turn_words, turned_away_and_back
 from mission.log.blame.leg import Leg
 from mission.log.blame.perception import lag_words, lateness, of_perception, of_unseen
+from mission.log.blame.position_jump import of_position, position_jump_before, position_jump_unseen
 from mission.log.blame.records import Culprit, Excursion, Fault, Kind, Limits
 from mission.log.blame.spans import spans
-from mission.log.blame.tracking import of_tracking
+from mission.log.blame.tracking import NO_SETPOINT_WORDS, of_tracking
 
 Floats = NDArray[np.float64]
 
@@ -47,8 +48,13 @@ def off_line(leg: Leg, limits: Limits) -> Iterator[Excursion]:
         elif largest == "executive":
             culprit, fault, evidence = _of_executive(leg, start_ns, end_ns, shares["executive"])
         else:
-            culprit, fault, evidence = of_tracking(leg.motion, lateral, peak, side)
-        if culprit is not Culprit.PERCEPTION:
+            worst = int(known[(side * off_m[known]).argmax()])  # nobody is off a setpoint that was not sent
+            culprit, fault, evidence = of_tracking(leg.motion, lateral, worst, side)
+        own = position_jump_before(leg, start_ns, peak, float(abs(off_m[peak])))
+        if own is not None:
+            # The line as told lies by the vehicle's position, and jumps with it: that comes before all else.
+            culprit, fault, evidence = of_position(own)
+        elif culprit is not Culprit.PERCEPTION:
             jump = jump_before(leg, start_ns, peak, float(abs(off_m[peak])))
             turned = turned_away_and_back(leg, start_ns, peak)
             bend = bend_near(leg, start_ns, peak)
@@ -88,11 +94,7 @@ def _of_nothing(
 ) -> tuple[Culprit, Fault, tuple[str, ...]]:
     """Nothing can be divided: the line was not told, or nothing was sent."""
     if np.isfinite(leg.lateral.age_s[beyond]).any():
-        return (
-            Culprit.EXECUTIVE,
-            Fault.SETPOINT,
-            ("No setpoint was sent meanwhile: the autopilot had nothing to fly to.",),
-        )
+        return Culprit.EXECUTIVE, Fault.SETPOINT, NO_SETPOINT_WORDS
     return of_perception(leg, start_ns, end_ns, beyond)
 
 
@@ -118,6 +120,9 @@ def unseen(leg: Leg, limits: Limits) -> Iterator[Excursion]:
         peak_s = float(age_s[inside].max())
         start_ns = max(leg.start_ns, first_ns - round(limits.unseen_s * NS_PER_S))
         culprit, fault, evidence = of_unseen(leg, start_ns, end_ns)
+        own = position_jump_unseen(leg, start_ns, end_ns)
+        if own is not None and fault not in (Fault.LATE, Fault.MISSING):
+            culprit, fault, evidence = of_position(own)
         told = f"for {peak_s:.1f} s nothing told where the line was"
         yield Excursion(
             Kind.UNSEEN,

@@ -8,9 +8,9 @@ from numpy.typing import NDArray
 
 from drivers.clock import NS_PER_S
 from mission.log.blame.lag import ImageLag
-from mission.log.blame.leg import Leg
+from mission.log.blame.leg import GROWTH_S, Leg
 from mission.log.blame.records import Culprit, Fault
-from mission.log.blame.tracking import of_tracking
+from mission.log.blame.tracking import NO_SETPOINT_WORDS, of_tracking
 
 _OLD_S = 0.3  # latency over which an estimate is late
 _GONE_SHARE = 0.5  # of an excursion, without news of the line
@@ -73,11 +73,19 @@ def of_unseen(leg: Leg, start_ns: int, end_ns: int) -> tuple[Culprit, Fault, tup
         return Culprit.PERCEPTION, Fault.LATE, late
     inside = np.flatnonzero((leg.lateral.t_ns >= start_ns) & (leg.lateral.t_ns <= end_ns))
     if leg.view is not None and float((leg.view[inside] > _VIEW_SHARE).mean()) > _OUT_OF_VIEW_SHARE:
-        tracking_m = np.nan_to_num(leg.lateral.tracking_m[inside])
-        peak = int(inside[np.abs(tracking_m).argmax()])
-        side = math.copysign(1.0, leg.lateral.tracking_m[peak])
-        culprit, fault, evidence = of_tracking(leg.motion, leg.lateral, peak, side)
-        return culprit, fault, ("The vehicle was so far aside and so tilted that the line left the picture.", *evidence)
+        out_of_view = "The vehicle was so far aside and so tilted that the line left the picture."
+        tracking_m = leg.lateral.tracking_m
+        first = int(np.searchsorted(leg.lateral.t_ns, start_ns - round(GROWTH_S * NS_PER_S)))
+        known = first + np.flatnonzero(np.isfinite(tracking_m[first : inside[-1] + 1]))
+        if known.size:
+            # Where setpoints ended before, the last of them is what it was off.
+            within = known[known >= inside[0]]
+            peak = int(within[np.abs(tracking_m[within]).argmax()] if within.size else known[-1])
+            side = math.copysign(1.0, tracking_m[peak])
+            culprit, fault, evidence = of_tracking(leg.motion, leg.lateral, peak, side)
+            return culprit, fault, (out_of_view, *evidence)
+        if not np.isfinite(leg.motion.setpoint_m[first : inside[-1] + 1]).any():
+            return Culprit.EXECUTIVE, Fault.SETPOINT, (out_of_view, *NO_SETPOINT_WORDS)
     return Culprit.PERCEPTION, *_missing(leg, start_ns, end_ns)
 
 

@@ -46,6 +46,8 @@ class Fault(enum.StrEnum):
     """The line turned onto another span, and that was told late, or flown too sharply to be followed."""
     TRACKING = "tracking"
     """The vehicle was not at its setpoint, and nothing pushed it."""
+    POSITION = "position"
+    """The vehicle's position jumped, as the autopilot told it, without the vehicle."""
     PUSHED = "pushed"
     """The vehicle was pushed off its setpoint."""
 

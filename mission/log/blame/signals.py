@@ -17,6 +17,8 @@ _SLOPE_S = 0.4  # over which a velocity's slope is taken: telemetry comes 20 tim
 
 _STRAIGHT_RAD = np.radians(8.0)
 _BEND_S = 3.0  # before and after a bend, the other span may be the nearer one
+_JUMP_M = 0.4  # between two states, beyond the way that their velocities tell: none that flies does that
+_JUMP_S = 0.5  # between states that are further apart, velocities do not tell the way so well
 _BEND_AWAY_M = 12.0  # at most so far from the vehicle the line may bend (mission/known_line.py)
 
 
@@ -25,11 +27,13 @@ class Motion:
     """The vehicle as the autopilot told it, and the setpoint that it had, at (n,) times [ns].
 
     Positions and setpoints are (n, 3) NED [m], NaN where there was no setpoint; `thrust_m_s2` and `push_m_s2` are
-    (n, 2) north, east: what its tilt and what everything else, which is the air, did to it.
+    (n, 2) north, east: what its tilt and what everything else, which is the air, did to it. `velocity_m_s` (n, 3) NED
+    is the autopilot's own, not the slope of its positions.
     """
 
     t_ns: Times
     position_m: Floats
+    velocity_m_s: Floats
     roll_rad: Floats
     yaw_rad: Floats
     setpoint_m: Floats
@@ -50,19 +54,21 @@ def motion_of(flight: Flight) -> Motion:
     t_ns = np.array([state.t_ns for state in states], dtype=np.int64)
     position_m = np.array([(s.north_m, s.east_m, s.down_m) for s in states], dtype=np.float64).reshape(-1, 3)
     velocity_m_s = np.array([(s.v_north_m_s, s.v_east_m_s, s.v_down_m_s) for s in states], dtype=np.float64)
+    velocity_m_s = velocity_m_s.reshape(-1, 3)
     angles = np.array([(s.roll_rad, s.pitch_rad, s.yaw_rad) for s in states], dtype=np.float64).reshape(-1, 3)
     setpoints = flight.setpoints
     sent_ns = np.array([s.t_ns for s in setpoints], dtype=np.int64)
     sent = np.array([(s.north_m, s.east_m, s.down_m, s.yaw_rad) for s in setpoints], dtype=np.float64).reshape(-1, 4)
     held = held_at(t_ns, sent_ns, sent, longest_s=1.0)
     down = down_axis(angles)
-    acceleration = slope(t_ns, velocity_m_s.reshape(-1, 3))
+    acceleration = slope(t_ns, velocity_m_s)
     # Along the thrust, minus the body's down axis, what is left of gravity when the vertical acceleration is taken out.
     lift_m_s2 = (GRAVITY_M_S2 - acceleration[:, 2]) / np.maximum(down[:, 2], 0.2)
     thrust_m_s2 = -lift_m_s2[:, None] * down[:, :2]
     return Motion(
         t_ns=t_ns,
         position_m=position_m,
+        velocity_m_s=velocity_m_s,
         roll_rad=angles[:, 0],
         yaw_rad=angles[:, 2],
         setpoint_m=held[:, :3],
@@ -71,6 +77,19 @@ def motion_of(flight: Flight) -> Motion:
         push_m_s2=acceleration[:, :2] - thrust_m_s2,
         tilt_rad=np.arccos(np.clip(down[:, 2], -1.0, 1.0)),
     )
+
+
+def unexplained_steps_m(motion: Motion) -> Floats:
+    """By how much the position jumped since the state before, (n, 2) NE [m]: 0 where the velocity explains its way."""
+    steps_m = np.zeros((len(motion.t_ns), 2))
+    if len(motion.t_ns) < 2:
+        return steps_m
+    dt_s = np.diff(motion.t_ns) / NS_PER_S
+    flown_m = 0.5 * (motion.velocity_m_s[1:, :2] + motion.velocity_m_s[:-1, :2]) * dt_s[:, None]
+    beyond_m = np.diff(motion.position_m[:, :2], axis=0) - flown_m
+    is_jump = (np.linalg.norm(beyond_m, axis=1) > _JUMP_M) & (dt_s <= _JUMP_S)
+    steps_m[1:] = np.where(is_jump[:, None], beyond_m, 0.0)
+    return steps_m
 
 
 def down_axis(angles_rad: Floats) -> Floats:
@@ -224,7 +243,10 @@ def _ray_distance_m(places_m: Floats, way: Floats) -> Floats:
 
 
 def _aside_m(told: Floats, motion: Motion, right: Floats) -> Floats:
-    """The vehicle's distance from the median of the lines (m, 4) that were told within a straight leg."""
+    """The vehicle's distance from the median of the lines (m, 4) that were told within a straight leg.
+
+    Where the autopilot's position jumped, neither vehicle nor line did: that is taken out of both.
+    """
     n = len(motion.t_ns)
     if not n:
         return np.empty(0)
@@ -236,8 +258,12 @@ def _aside_m(told: Floats, motion: Motion, right: Floats) -> Floats:
     if float(np.percentile(turned_rad, 90)) > _STRAIGHT_RAD:
         return np.full(n, np.nan)
     normal = np.array([-np.sin(middle_rad), np.cos(middle_rad)])
-    place_m = float(np.median(told[:, :2] @ normal))
-    return np.asarray((motion.position_m[:, :2] @ normal - place_m) * np.sign(np.nan_to_num(right) @ normal))
+    jumped_m = np.cumsum(unexplained_steps_m(motion), axis=0)
+    then = np.searchsorted(motion.t_ns, told[:, 3].astype(np.int64), side="right") - 1
+    place_m = float(np.median((told[:, :2] - jumped_m[then]) @ normal))
+    return np.asarray(
+        ((motion.position_m[:, :2] - jumped_m) @ normal - place_m) * np.sign(np.nan_to_num(right) @ normal)
+    )
 
 
 def _mean_axis_rad(headings_rad: Floats) -> float:

@@ -16,17 +16,20 @@ Floats = NDArray[np.float64]
 TILT_LIMIT_RAD = math.radians(38.0)
 """A vehicle that is tilted so far does what it can."""
 
+NO_SETPOINT_WORDS = ("No setpoint was sent meanwhile: the autopilot had nothing to fly to.",)
+
 _BEGUN = 0.25  # share of its peak where an excursion began
 _BEFORE_S = 2.0
 _SLOW = 0.1  # share of its greatest speed
+_OUT_M, _BACK_SHARE = 0.5, 0.5  # a setpoint that was off the line by that much, and now by less than that share
 _OWN_SHARE, _OWN_M = 0.5, 0.5  # of the way off the line, which a sound vehicle would not have been
 
 
 def of_tracking(motion: Motion, lateral: Lateral, peak: int, side: float) -> tuple[Culprit, Fault, tuple[str, ...]]:
     """Who took the vehicle off its setpoint, to the side where `side` is 1 (right) or -1, up to the sample `peak`.
 
-    The setpoint itself, where it went away; else the air or the vehicle's own thrust, whichever gave it the larger
-    impulse while it gathered way.
+    At `peak` the setpoint has to be known. The setpoint itself did, where it went away; else the air or the vehicle's
+    own thrust, whichever gave it the larger impulse while it gathered way.
     """
     t_ns = motion.t_ns
     right = side * lateral.right[peak]
@@ -42,9 +45,13 @@ def of_tracking(motion: Motion, lateral: Lateral, peak: int, side: float) -> tup
     wanted_m_s2[earliest : peak + 1] = sound_m_s2 @ right
     off_m = float(np.nan_to_num(side * lateral.off_m[peak]))
     if excess_m[peak] < max(_OWN_M, _OWN_SHARE * min(off_m if off_m > 0.0 else math.inf, float(tracking_m[peak]))):
-        moved_m = float(-(motion.setpoint_m[peak, :2] - motion.setpoint_m[first, :2]) @ right)
-        sound = off_m - float(excess_m[peak])
-        return Culprit.EXECUTIVE, Fault.SETPOINT, _moved_words(moved_m, sound, late_s)
+        sent_m = motion.setpoint_m[during, :2]
+        sent_m = sent_m[np.isfinite(sent_m).all(axis=1)]
+        moved_m = float((sent_m[0] - sent_m[-1]) @ right)
+        out_m = float(np.nan_to_num(side * lateral.executive_m[earliest : peak + 1]).max())
+        is_back = out_m > _OUT_M and side * lateral.executive_m[peak] < _BACK_SHARE * out_m
+        words = _back_words(out_m, side) if is_back else _moved_words(moved_m)
+        return Culprit.EXECUTIVE, Fault.SETPOINT, (words, _sound_words(off_m - float(excess_m[peak]), late_s))
     pushed = motion.push_m_s2 @ right
     thrust = motion.thrust_m_s2 @ right
     # Up to the turning point whatever moved it is braked again: what counts is how it got its way on.
@@ -95,8 +102,18 @@ def _went(who: str, away_m_s: float) -> str:
     return f"{who} {'away' if away_m_s > 0.0 else 'back'} by {abs(away_m_s):.1f} m/s"
 
 
-def _moved_words(moved_m: float, sound_m: float, late_s: float) -> tuple[str, str]:
+def _moved_words(moved_m: float) -> str:
+    return f"The setpoint went {abs(moved_m):.2f} m aside, and the vehicle came behind it as it should."
+
+
+def _back_words(out_m: float, side: float) -> str:
+    """Why the setpoint is to blame, though at the peak it is nearer the line than the vehicle."""
+    words = "right" if side > 0 else "left"
     return (
-        f"The setpoint went {abs(moved_m):.2f} m aside, and the vehicle came behind it as it should.",
-        f"a sound vehicle, {late_s:.2f} s behind its setpoint, would have been {sound_m:.2f} m off the line, too",
+        f"The setpoint had gone {out_m:.2f} m to the {words} of the line as told and came back faster than any vehicle "
+        "follows: this one came behind it as it should, and that is why it was so far off its setpoint."
     )
+
+
+def _sound_words(sound_m: float, late_s: float) -> str:
+    return f"a sound vehicle, {late_s:.2f} s behind its setpoint, would have been {sound_m:.2f} m off the line, too"
