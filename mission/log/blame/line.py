@@ -74,7 +74,7 @@ def off_line(leg: Leg, limits: Limits) -> Iterator[Excursion]:
         made_of = ", ".join(f"{name} {part:+.2f} m" for name, part in parts.items() if math.isfinite(part))
         first = f"{abs(off_m[peak]):.2f} m to the {words} of the line{as_known}"
         if made_of:
-            first += f"; while beyond the limit, in the mean: {made_of}"
+            first += f"; what that is made of, counted to the {words}, in the mean while beyond the limit: {made_of}"
         yield Excursion(
             Kind.OFF_LINE,
             leg.task,
