@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from mission.ending import EXIT_BAD_INPUT, EXIT_DIFFERENT, EXIT_FAILED_FILE, fail, print_report, tell_damage
+from mission.ending import EXIT_BAD_INPUT, EXIT_DIFFERENT, EXIT_FAILED_FILE, fail, print_report, tell_flaws
 from mission.fly_commands import JsonOption
 from mission.log.errors import LogError
 
@@ -72,7 +72,7 @@ def compare(
     except (LogError, ConditionError) as error:
         fail(str(error), EXIT_BAD_INPUT)
     for log, flight in zip(logs, flights, strict=True):
-        tell_damage(log, flight.damage)
+        tell_flaws(log, flight.flaws)
     found = [condition.failure(comparison.figures[0], comparison.figures[-1]) for condition in conditions]
     failures = [words for words in found if words is not None]
     if as_json:
@@ -117,7 +117,7 @@ def replay(
     )
     try:
         flight = read_flight(log)
-        tell_damage(log, flight.damage)
+        tell_flaws(log, flight.flaws)
         with shown as progress:
             frames = progress.add_task("", total=len(flight.image_times_ns))
             replayed = fly_again(flight, lambda: progress.advance(frames))
