@@ -115,6 +115,8 @@ def replay(
         transient=True,
         disable=not sys.stderr.isatty(),
     )
+    if write is not None and write.exists():
+        fail(f"{write} exists already; name another file, or remove it.", EXIT_BAD_INPUT)
     try:
         flight = read_flight(log)
         tell_flaws(log, flight.flaws)
@@ -128,11 +130,14 @@ def replay(
         fail(str(error), EXIT_BAD_INPUT)
     except CopyError as error:
         fail(str(error), EXIT_FAILED_FILE)
-    beyond = found.beyond(Tolerance()) if found.is_reference else ()
+    tolerance = Tolerance()
+    beyond = found.beyond(tolerance) if found.is_reference else ()
     if as_json:
         typer.echo(json.dumps(found.to_json() | {"beyond": list(beyond)}))
     else:
-        print_differences(found, beyond, Console())
+        print_differences(found, beyond, tolerance, Console(), is_damaged=flight.damage is not None)
+    if write is not None:
+        sys.stderr.write(f"reference  {write} ({write.stat().st_size / 1e6:.1f} MB)\n")
     if beyond:
         raise typer.Exit(EXIT_DIFFERENT)
 
