@@ -16,8 +16,8 @@ import typer
 from mission.log.errors import LogError
 
 if TYPE_CHECKING:
-    from drivers.mcap_stream import Damage
     from mission.flight import FlightOutcome
+    from mission.log.damage import Flaws
     from mission.log.flight_report import FlightReport
     from mission.plan_file import MissionFile
     from mission.simulated.aftermath import Aftermath
@@ -54,12 +54,10 @@ def read_mission(path: Path) -> "MissionFile":
         fail("\n".join(error.lines()), EXIT_BAD_INPUT)
 
 
-def tell_damage(log: Path, damage: "Damage | None") -> None:
-    """Say what could not be read of a log, if anything."""
-    from mission.log.damage import words_of_damage
-
-    if damage is not None:
-        sys.stderr.write(f"{log}: {words_of_damage(damage)}\n")
+def tell_flaws(log: Path, flaws: "Flaws") -> None:
+    """Say what a log lacks, if anything: it was cut off, or some of it is damaged."""
+    for line in flaws.lines:
+        sys.stderr.write(f"{log}: {line}\n")
 
 
 def read_report(log: Path) -> "FlightReport":

@@ -2,15 +2,17 @@
 
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mission.ending import EXIT_FAILED_FILE, fail, refuse, tell_damage
+from mission.ending import EXIT_FAILED_FILE, fail, refuse, tell_flaws
 from mission.export.errors import ExportError, OutputError
 from mission.log.errors import LogError
+from mission.log.wording import counted
 
 if TYPE_CHECKING:
     from mission.export.flight_map import FlightMap
@@ -76,11 +78,12 @@ def export_images(
         refuse("EXIF needs Pillow, which is not installed; install it with: pip install 'lineflight[export]'.")
     with _sentences(log), _progress("images") as advance:
         written = export_images(log, folder, task=task, every=every, on_image=advance)
-    typer.echo(f"{folder}: {written.n_images} images, and their poses for COLMAP in {folder / 'sparse' / '0'}")
+    whose = "its pose" if written.n_images == 1 else "their poses"
+    typer.echo(f"{folder}: {counted(written.n_images, 'image')}, and {whose} for COLMAP in {folder / 'sparse' / '0'}")
     if written.n_without_pose:
-        typer.echo(f"{written.n_without_pose} frames were left out: the log does not tell where they were taken")
+        typer.echo(f"{counted(written.n_without_pose, 'frame')} left out: the log does not tell where they were taken")
     if not written.has_gps:
-        typer.echo("the images carry no GPS position: the autopilot did not tell where on Earth its local frame lies")
+        typer.echo("the images carry no GPS position: the log does not tell where on Earth the local frame lies")
 
 
 def _write_map(log: Path, file: Path, suffixes: tuple[str, ...], written: "Callable[[FlightMap], bytes]") -> None:
@@ -111,21 +114,27 @@ def _counted(flight_map: "FlightMap") -> str:
 
 
 def _say_tables(folder: Path, n_rows: dict[str, int]) -> None:
-    typer.echo(f"{folder}: {len(n_rows)} tables with {sum(n_rows.values())} records")
+    typer.echo(f"{folder}: {counted(len(n_rows), 'table')} with {counted(sum(n_rows.values()), 'record')}")
 
 
 @contextmanager
 def _sentences(log: Path) -> Iterator[None]:
     """End the command with the sentence and the exit code that an error of the export stands for.
 
-    What of the log is damaged, and so not exported, is said too.
+    What the log lacks, and so was not exported, is said too: it may be why there is no export.
     """
-    from mission.log.reader import find_damage
+    from mission.log.reader import find_flaws
 
     try:
         yield
-        tell_damage(log, find_damage(log))
-    except (LogError, ExportError) as error:
+        tell_flaws(log, find_flaws(log))
+    except ExportError as error:
+        with suppress(LogError):
+            tell_flaws(log, find_flaws(log))
+        refuse(str(error))
+    except LogError as error:
+        with suppress(LogError):  # which says itself where too little is left
+            tell_flaws(log, replace(find_flaws(log), is_cut_off=False))
         refuse(str(error))
     except OutputError as error:
         fail(str(error), EXIT_FAILED_FILE)

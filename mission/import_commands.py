@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from mission.ending import EXIT_FAILED_FILE, fail, refuse, tell_damage
+from mission.ending import EXIT_FAILED_FILE, fail, refuse, tell_flaws
 from mission.log.errors import LogError
 
 if TYPE_CHECKING:
@@ -39,7 +39,7 @@ def import_log(
         refuse(f"{out} exists already; name another file by --out, or remove it.")
     try:
         flight = _read_ours(log)
-        tell_damage(log, flight.damage)
+        tell_flaws(log, flight.flaws)
         with _progress(f"reading {autopilot_log.name}") as tell:
             logs = read_autopilot_log(autopilot_log, tell)
         alignment = align_best(flight, logs)

@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from mission.ending import EXIT_BAD_INPUT, EXIT_DIFFERENT, EXIT_FAILED_FILE, fail, print_report, tell_damage
+from mission.ending import EXIT_BAD_INPUT, EXIT_DIFFERENT, EXIT_FAILED_FILE, fail, print_report, tell_flaws
 from mission.fly_commands import JsonOption
 from mission.log.errors import LogError
 
@@ -72,7 +72,7 @@ def compare(
     except (LogError, ConditionError) as error:
         fail(str(error), EXIT_BAD_INPUT)
     for log, flight in zip(logs, flights, strict=True):
-        tell_damage(log, flight.damage)
+        tell_flaws(log, flight.flaws)
     found = [condition.failure(comparison.figures[0], comparison.figures[-1]) for condition in conditions]
     failures = [words for words in found if words is not None]
     if as_json:
@@ -115,9 +115,11 @@ def replay(
         transient=True,
         disable=not sys.stderr.isatty(),
     )
+    if write is not None and write.exists():
+        fail(f"{write} exists already; name another file, or remove it.", EXIT_BAD_INPUT)
     try:
         flight = read_flight(log)
-        tell_damage(log, flight.damage)
+        tell_flaws(log, flight.flaws)
         with shown as progress:
             frames = progress.add_task("", total=len(flight.image_times_ns))
             replayed = fly_again(flight, lambda: progress.advance(frames))
@@ -128,11 +130,14 @@ def replay(
         fail(str(error), EXIT_BAD_INPUT)
     except CopyError as error:
         fail(str(error), EXIT_FAILED_FILE)
-    beyond = found.beyond(Tolerance()) if found.is_reference else ()
+    tolerance = Tolerance()
+    beyond = found.beyond(tolerance) if found.is_reference else ()
     if as_json:
         typer.echo(json.dumps(found.to_json() | {"beyond": list(beyond)}))
     else:
-        print_differences(found, beyond, Console())
+        print_differences(found, beyond, tolerance, Console(), is_damaged=flight.damage is not None)
+    if write is not None:
+        sys.stderr.write(f"reference  {write} ({write.stat().st_size / 1e6:.1f} MB)\n")
     if beyond:
         raise typer.Exit(EXIT_DIFFERENT)
 

@@ -87,7 +87,7 @@ class _MapMaker:
         if origin is None:
             raise ExportError(
                 f"{flight.path} cannot be put on a map: KML and GeoJSON need to know where on Earth the local frame "
-                "lies, and the autopilot did not tell it in this flight; export csv gives the local positions."
+                "lies, and this log does not tell it; export csv gives the local positions."
             )
         self._flight = flight
         self._origin = origin

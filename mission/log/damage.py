@@ -2,6 +2,7 @@
 
 import dataclasses
 import json
+from dataclasses import dataclass
 
 from drivers.clock import NS_PER_S
 from drivers.mcap_stream import Damage, McapFile
@@ -9,7 +10,23 @@ from drivers.mcap_stream import Damage, McapFile
 METADATA = "lineflight damage"
 """The metadata in which a copy keeps what its original lacked: the copy itself is sound."""
 
+CUT_OFF = "The log was cut off; this is what it still holds."
+
 _LEAST_SAID_NS = NS_PER_S // 20  # shorter is 0.0 s
+
+
+@dataclass(frozen=True, slots=True)
+class Flaws:
+    """What a log lacks: what is `damage`d of it, and its end where it was cut off, since its program died."""
+
+    damage: Damage | None
+    is_cut_off: bool
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """A sentence for each of both that is so."""
+        words = () if self.damage is None else (words_of_damage(self.damage),)
+        return (CUT_OFF, *words) if self.is_cut_off else words
 
 
 def damage_of(log: McapFile) -> Damage | None:

@@ -15,7 +15,7 @@ from drivers.camera.camera import Intrinsics
 from drivers.mcap_stream import IMAGE_DATA_FIELD, IMAGE_TOPIC, Damage, McapFile, bytes_field, open_messages
 from mission.autopilot import VehicleState
 from mission.log import channels
-from mission.log.damage import damage_of
+from mission.log.damage import Flaws, damage_of
 from mission.log.errors import LogError
 from mission.log.imported import (
     Imported,
@@ -47,6 +47,7 @@ from mission.replay.records import ReplayedEstimate, ReplayedSetpoint
 from vision.records import VisionReport
 
 _IMPORTED = (ImportedState, ImportedSetpoint, ImportedActuators, ImportedPower, ImportedText, ImportedMode)
+_IMPORTED_LOG_TOPIC = channels.CHANNEL_OF[ImportedLog].topic
 _NOT_FLOWN = (*_IMPORTED, *channels.CAPTURE_TIMED)  # whose times do not tell when the flight ended
 
 
@@ -89,6 +90,11 @@ class Flight:
     end_ns: int
     is_truncated: bool
     damage: Damage | None = None
+
+    @property
+    def flaws(self) -> Flaws:
+        """What the log lacks."""
+        return Flaws(self.damage, self.is_truncated)
 
     @property
     def holes_ns(self) -> tuple[tuple[int, int], ...]:
@@ -141,12 +147,14 @@ def stream_log(path: Path) -> Iterator[tuple[str, int, Any]]:
         yield from _contents(path, log)
 
 
-def find_damage(path: Path) -> Damage | None:
-    """Read a whole log only to see what of it is damaged. Raises LogError where it cannot be read at all."""
+def find_flaws(path: Path) -> Flaws:
+    """Read a whole log only to see what it lacks. Raises LogError where it cannot be read at all."""
+    was_cut_off = False  # before the autopilot's log was laid beside it, in a copy
     with _opened(path) as log:
-        for _ in log.messages():
-            pass
-        return damage_of(log)
+        for topic, _, body in log.messages():
+            if topic == _IMPORTED_LOG_TOPIC:
+                was_cut_off = channels.decode(topic, body).was_cut_off
+        return Flaws(damage_of(log), not log.is_closed or was_cut_off)
 
 
 @contextmanager

@@ -7,6 +7,7 @@ from rich.padding import Padding
 from rich.table import Table
 from rich.text import Text
 
+from mission.log.damage import CUT_OFF
 from mission.log.flight_report import EventSummary, ExcursionSummary, FlightReport, TaskSummary
 from mission.log.paper import Part, put, table
 from mission.log.task_spans import UNFINISHED
@@ -37,7 +38,7 @@ def _parts(report: FlightReport) -> Iterator[Part]:
         for line in lines:
             yield Text.assemble(("pre-flight  ", "dim"), (line, style))
     if report.is_truncated:
-        yield Text("The log was cut off; this is what it still holds.", style="yellow")
+        yield Text(CUT_OFF, style="yellow")
     if report.damage is not None:
         yield Text(report.damage, style="yellow")
     yield Text()

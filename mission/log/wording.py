@@ -35,13 +35,18 @@ def line_of(record: Worded) -> tuple[str, Severity, str]:
             return "mission", Severity.INFO, f"{words_of(record.task)} started"
         case TaskEnded():
             ended = f"{words_of(record.task)} {words_of(record.result)}"
-            return "mission", severity_of(record.result), f"{ended}: {record.reason}"
+            return "mission", severity_of(record.result), f"{ended}: {_reason(record)}"
         case MissionEnded():
-            return "mission", severity_of(record.result), f"mission {words_of(record.result)}: {record.reason}"
+            return "mission", severity_of(record.result), f"mission {words_of(record.result)}: {_reason(record)}"
         case StatusText():
             return "autopilot", Severity.INFO, record.text
         case _ as unreachable:
             assert_never(unreachable)
+
+
+def _reason(record: TaskEnded | MissionEnded) -> str:
+    """Why it ended, without the name of its result, which some reasons begin with and the line has said."""
+    return record.reason.removeprefix(f"{words_of(record.result)}: ")
 
 
 def severity_of(result: Result) -> Severity:

@@ -6,6 +6,7 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
+from drivers.clock import NS_PER_S
 from mission.autopilot import Setpoint
 from mission.guidance import wrap_angle_rad
 from vision.records import LineEstimate, wrap_line_angle_rad
@@ -13,11 +14,12 @@ from vision.records import LineEstimate, wrap_line_angle_rad
 
 @dataclass(frozen=True, slots=True)
 class Spread:
-    """How large differences are."""
+    """How large differences are, and when the largest was [s since the start that was given]; None: nobody said."""
 
     median: float
     p95: float
     max: float
+    max_s: float | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -107,32 +109,39 @@ class Tolerance:
 
 
 def estimate_differences(
-    now: Mapping[int, LineEstimate | None], then: Mapping[int, LineEstimate | None]
+    now: Mapping[int, LineEstimate | None], then: Mapping[int, LineEstimate | None], start_ns: int = 0
 ) -> EstimateDifferences:
-    """Hold estimates, by their frames' times, against those of before."""
-    both = [(now[t_ns], then[t_ns]) for t_ns in now if t_ns in then]
-    pairs = [(a, b) for a, b in both if a is not None and b is not None]
+    """Hold estimates, by their frames' times [ns], against those of before."""
+    times_ns = [t_ns for t_ns in now if t_ns in then]
+    both = [(now[t_ns], then[t_ns]) for t_ns in times_ns]
+    timed = zip(times_ns, both, strict=True)
+    shown = [(t_ns, a, b) for t_ns, (a, b) in timed if a is not None and b is not None]
+    shown_s = [(t_ns - start_ns) / NS_PER_S for t_ns, _, _ in shown]
+    pairs = [(a, b) for _, a, b in shown]
     return EstimateDifferences(
         n=len(both),
         n_lacking=len(then.keys() - now.keys()),
         n_same=sum(a == b for a, b in both),
         n_only_now=sum(a is not None and b is None for a, b in both),
         n_only_then=sum(a is None and b is not None for a, b in both),
-        angle_deg=_spread([math.degrees(wrap_line_angle_rad(a.angle_rad - b.angle_rad)) for a, b in pairs]),
-        offset_px=_spread([_offset_difference_px(a, b) for a, b in pairs]),
+        angle_deg=_spread([math.degrees(wrap_line_angle_rad(a.angle_rad - b.angle_rad)) for a, b in pairs], shown_s),
+        offset_px=_spread([_offset_difference_px(a, b) for a, b in pairs], shown_s),
     )
 
 
-def setpoint_differences(pairs: Sequence[tuple[Setpoint, Setpoint]], n_lacking: int = 0) -> SetpointDifferences:
-    """Hold setpoints against those of before."""
+def setpoint_differences(
+    pairs: Sequence[tuple[Setpoint, Setpoint]], n_lacking: int = 0, times_s: Sequence[float] | None = None
+) -> SetpointDifferences:
+    """Hold setpoints, sent at `times_s`, against those of before."""
     return SetpointDifferences(
         n=len(pairs),
         n_lacking=n_lacking,
         n_same=sum(a == b for a, b in pairs),
         distance_m=_spread(
-            [math.dist((a.north_m, a.east_m, a.down_m), (b.north_m, b.east_m, b.down_m)) for a, b in pairs]
+            [math.dist((a.north_m, a.east_m, a.down_m), (b.north_m, b.east_m, b.down_m)) for a, b in pairs],
+            times_s,
         ),
-        yaw_deg=_spread([math.degrees(wrap_angle_rad(a.yaw_rad - b.yaw_rad)) for a, b in pairs]),
+        yaw_deg=_spread([math.degrees(wrap_angle_rad(a.yaw_rad - b.yaw_rad)) for a, b in pairs], times_s),
     )
 
 
@@ -142,8 +151,9 @@ def _offset_difference_px(a: LineEstimate, b: LineEstimate) -> float:
     return a.offset_px + b.offset_px if is_turned else a.offset_px - b.offset_px
 
 
-def _spread(values: Sequence[float]) -> Spread | None:
+def _spread(values: Sequence[float], times_s: Sequence[float] | None) -> Spread | None:
     if not values:
         return None
     sizes = np.abs(np.array(values))
-    return Spread(float(np.median(sizes)), float(np.percentile(sizes, 95)), float(sizes.max()))
+    max_s = None if times_s is None else times_s[int(sizes.argmax())]
+    return Spread(float(np.median(sizes)), float(np.percentile(sizes, 95)), float(sizes.max()), max_s)

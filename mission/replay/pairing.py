@@ -33,19 +33,26 @@ def moments_of(flight: Flight) -> Moments:
     A flight writes each tick first, and then what the tick takes: so the order of the file tells, where it is still the
     one in which the flight wrote it. Other tools may have sorted it by time. A report stands at the time of its frame,
     which lies before the tick that took it; then it counts from when it was made (its latency) on, which may be a tick
-    too early, since it still had its way to go. Raises LogError when the log cannot be read any more.
+    too early, since it still had its way to go. In a damaged log what stands behind a hole belongs to a tick that is
+    lost: none is given what is younger than it, nor what follows that. Raises LogError when the log cannot be read any
+    more.
     """
     reports = {frame_of(report): report for report in flight.reports}
     moments: list[Moment] = []
     newest_ns = 0
     was_sorted = True
+    is_lost = False  # the tick to which belongs what comes
     for log_time_ns, record in _ticks_and_what_they_take(flight):
         was_sorted = was_sorted and log_time_ns >= newest_ns
         newest_ns = log_time_ns
         if isinstance(record, ControlTick):
             moments.append(Moment(record, None, ()))
-        elif moments:  # before the first tick there is pre-flight
+            is_lost = False
+        elif moments and not is_lost:  # before the first tick there is pre-flight
             tick, state, taken = moments[-1].tick, moments[-1].state, moments[-1].reports
+            is_lost = record.t_ns > tick.t_ns
+            if is_lost:
+                continue
             if isinstance(record, VehicleState):
                 moments[-1] = Moment(tick, record, taken)
             else:

@@ -4,11 +4,13 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from drivers.clock import NS_PER_S
 from mission.autopilot import Setpoint
 from mission.build import vision_settings
 from mission.log.copying import write_copy
 from mission.log.errors import LogError
 from mission.log.reader import Flight
+from mission.log.task_spans import flight_start_ns
 from mission.plan import MissionPlan
 from mission.replay.differences import Differences, estimate_differences, setpoint_differences
 from mission.replay.guidance import ReplayedTick, replay_guidance
@@ -37,7 +39,8 @@ def replay(flight: Flight, on_frame: Callable[[], None] = lambda: None) -> Repla
     if camera is None:
         raise LogError(f"The log {flight.path} does not tell its camera: it cannot be replayed.")
     if not flight.image_times_ns:
-        raise LogError(f"The log {flight.path} holds no frames (vision.log_rate_hz was 0): there is nothing to replay.")
+        why = " (vision.log_rate_hz was 0)" if flight.damage is None else ""
+        raise LogError(f"The log {flight.path} holds no frames{why}: there is nothing to replay.")
     reports = tuple(replay_vision(flight, vision_settings(plan, camera), on_frame))
     today = {frame_of(report): report for report in reports}
     paired = moments_of(flight)
@@ -50,22 +53,24 @@ def replay(flight: Flight, on_frame: Callable[[], None] = lambda: None) -> Repla
 
 def differences(flight: Flight, replayed: Replay) -> Differences:
     """Hold a replay against the reference in the log, where there is one, else against the flight."""
-    n_lacking = 0
+    n_lacking, start_ns = 0, flight_start_ns(flight)
     now = {report.t_capture_ns: report.estimate for report in replayed.reports}
     if flight.reference_estimates:
         then = {estimate.t_ns: estimate.estimate for estimate in flight.reference_estimates}
         setpoints = {s.t_ns: Setpoint(s.north_m, s.east_m, s.down_m, s.yaw_rad) for s in flight.reference_setpoints}
-        pairs = [(tick.replayed, setpoints[tick.t_ns]) for tick in replayed.ticks if tick.t_ns in setpoints]
+        ticks = [tick for tick in replayed.ticks if tick.t_ns in setpoints]
+        pairs = [(tick.replayed, setpoints[tick.t_ns]) for tick in ticks]
         n_lacking = len(setpoints) - len(pairs)
     else:
         then = {report.t_capture_ns: report.estimate for report in flight.reports}
-        pairs = [(tick.replayed, tick.flown) for tick in replayed.ticks]
+        ticks = list(replayed.ticks)
+        pairs = [(tick.replayed, tick.flown) for tick in ticks]
         then = {t_ns: then[t_ns] for t_ns in flight.image_times_ns if t_ns in then}
     return Differences(
         bool(flight.reference_estimates),
         replayed.is_by_order,
-        estimate_differences(now, then),
-        setpoint_differences(pairs, n_lacking),
+        estimate_differences(now, then, start_ns),
+        setpoint_differences(pairs, n_lacking, [(tick.t_ns - start_ns) / NS_PER_S for tick in ticks]),
     )
 
 
@@ -91,6 +96,8 @@ def write_reference(flight: Flight, replayed: Replay, out: Path, tell: Callable[
 def _plan(flight: Flight) -> MissionPlan:
     """The plan that was flown: as the log keeps it filled in, or from the mission's text in older logs."""
     text = flight.attachments.get("plan.json")
+    if text is None and not flight.mission.text and flight.damage is not None:
+        raise LogError(f"The mission file in the log {flight.path} is damaged; it cannot be replayed.")
     try:
         if text is not None:
             return MissionPlan.model_validate_json(text)

@@ -13,7 +13,7 @@ from drivers.camera.camera import Intrinsics
 from drivers.clock import NS_PER_S
 from mission.log.canvas import ACCENT, INK, Box, Canvas
 from mission.log.reader import Flight
-from mission.log.task_spans import TaskSpan, task_spans
+from mission.log.task_spans import TaskSpan, flight_start_ns, task_spans
 from mission.log.track_map import MapView, map_view, task_color
 from mission.log.wording import words_of
 from mission.simulated.pictures import MOUNTS, PicturesError, picture_camera, scaled
@@ -32,6 +32,8 @@ RATE_HZ = 25.0
 ReplayCamera = Literal["down", "front", "both"]
 
 _HFOV_DEG = 80.0
+_HOLE_S = 1.0  # poses farther apart tell nothing of what was flown between them
+_NOT_IN_LOG = "not in the log"
 _REPORT_NS = 200_000_000  # a report farther away in time says nothing about a frame
 _LINE_BGR = (40, 180, 255)
 _INSET_SHARE = 0.28  # of the picture's height
@@ -46,6 +48,13 @@ class Track:
     start_ns: int
     times_s: NDArray[np.float64]
     values: NDArray[np.float64]
+
+    def is_told_at(self, t_s: float) -> bool:
+        """Whether the log has the vehicle's place around a time, and no hole of the log lies there."""
+        after = int(np.searchsorted(self.times_s, t_s))
+        if after in (0, len(self.times_s)) or self.times_s[after] == t_s:
+            return True
+        return bool(self.times_s[after] - self.times_s[after - 1] <= _HOLE_S)
 
     def pose_at(self, t_s: float) -> Pose:
         """The pose at a time, in between by straight lines; yaw is kept unwrapped."""
@@ -101,8 +110,9 @@ def write_video(
 ) -> int:
     """Render the flight into an MP4 file, and say how many frames it has.
 
-    `size_px` is the size of each camera's picture, None as the flight's. `on_frame` hears which frame of how many is
-    done. Raises PicturesError.
+    Where poses are missing for more than a second the last picture stands, and the bar says so; the clock counts from
+    the first task's start. `size_px` is the size of each camera's picture, None as the flight's. `on_frame` hears which
+    frame of how many is done. Raises PicturesError.
     """
     intrinsics = flight.camera or picture_camera(640, 480, _HFOV_DEG)
     if size_px is not None:
@@ -145,17 +155,37 @@ class _View:
         self._before = pose
         return image
 
+    def forget(self) -> None:
+        """What is taken next is not next to what was taken before."""
+        self._before = None
+
 
 def _frames(track: Track, views: list[_View], overlay: "_Overlay", n_frames: int) -> Iterator[NDArray[np.uint8]]:
+    picture: NDArray[np.uint8] | None = None
+    pose = track.pose_at(0.0)
     for k in range(n_frames):
-        pose = track.pose_at(k / RATE_HZ)
+        t_s = k / RATE_HZ
+        if picture is not None and not track.is_told_at(t_s):
+            for view in views:
+                view.forget()
+            yield overlay.finish(picture, pose, track.start_ns + round(t_s * NS_PER_S), is_told=False)
+            continue
+        pose = track.pose_at(t_s)
         images = []
         for view in views:
             image = view.take(pose, k)
             if view.name == "down":
                 overlay.draw_lines(image, pose.t_ns)
             images.append(image)
-        yield overlay.finish(np.hstack(images), pose, k / RATE_HZ)
+        picture = np.hstack(images)
+        yield overlay.finish(picture, pose, pose.t_ns)
+
+
+def clock(t_s: float) -> str:
+    """Minutes and seconds since the flight's start, with a sign before it."""
+    tenths = round(abs(t_s) * 10)
+    sign = "-" if t_s < 0 and tenths else ""
+    return f"{sign}{tenths // 600}:{tenths % 600 / 10:04.1f}"
 
 
 class _Overlay:
@@ -165,6 +195,7 @@ class _Overlay:
         self._reports = flight.reports
         self._report_times = np.array([report.t_capture_ns for report in flight.reports], dtype=np.int64)
         self._spans = task_spans(flight)
+        self._start_ns = flight_start_ns(flight)
         self._camera = flight.camera or picture_camera(640, 480, _HFOV_DEG)
         self._canvas = Canvas(width_px, height_px + _BAR_PX)
         side = round(_INSET_SHARE * height_px)
@@ -186,16 +217,23 @@ class _Overlay:
                 image, (round(x1 * 8), round(y1 * 8)), (round(x2 * 8), round(y2 * 8)), _LINE_BGR, 2, cv2.LINE_AA, 3
             )
 
-    def finish(self, image: NDArray[np.uint8], pose: Pose, t_s: float) -> NDArray[np.uint8]:
-        """The whole frame; the next call draws over it."""
+    def finish(self, image: NDArray[np.uint8], pose: Pose, t_ns: int, *, is_told: bool = True) -> NDArray[np.uint8]:
+        """The whole frame at a time; the next call draws over it. Where it is not told, the picture is an older one."""
         canvas, height_px = self._canvas, image.shape[0]
         canvas.image[:height_px] = image
         canvas.panel(Box(0, height_px, image.shape[1], _BAR_PX), radius_px=1)
-        span = self._span_at(pose.t_ns)
+        span = self._span_at(t_ns) if is_told else None
         task = "" if span is None else words_of(span.task)
         baseline = height_px + _BAR_PX - 10
-        canvas.text((12, baseline), task, 15, INK if span is None else task_color(span.task), is_bold=True)
-        told = f"{round(-pose.down_m, 1) + 0.0:.1f} m     {int(t_s // 60)}:{t_s % 60:04.1f}"
+        canvas.text(
+            (12, baseline),
+            task if is_told else _NOT_IN_LOG,
+            15,
+            INK if span is None else task_color(span.task),
+            is_bold=True,
+        )
+        height = f"{round(-pose.down_m, 1) + 0.0:.1f} m     " if is_told else ""
+        told = height + clock((t_ns - self._start_ns) / NS_PER_S)
         canvas.text((image.shape[1] - 12 - canvas.text_width(told, 15), baseline), told, 15)
         canvas.paste(self._box, self._map, radius_px=6)
         place = self._map_view.to_px(np.array([[pose.north_m, pose.east_m]]), self._box)[0]

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 import typer
 
-from mission.ending import refuse, tell_damage
+from mission.ending import refuse, tell_flaws
 from mission.fly_commands import LightName
 
 app = typer.Typer(help="Take pictures of simulated worlds.", no_args_is_help=True)
@@ -122,7 +122,7 @@ def replay(
         refuse(f"--out is '{file}'; name a file that ends in .mp4.")
     try:
         flight = read_flight(log)
-        tell_damage(log, flight.damage)
+        tell_flaws(log, flight.flaws)
         from rich.console import Console
         from rich.progress import Progress
 

@@ -8,8 +8,11 @@ from pathlib import Path
 
 import pytest
 
+from mission.log import channels
 from mission.log.reader import Flight
+from mission.records import Origin
 from tests.support.command_line import ROOT, TIMEOUT_S, Ran, lineflight
+from tests.support.damaged_log import damage_chunks, write_in_chunks
 
 
 def assert_plain(ran: Ran, code: int) -> None:
@@ -121,3 +124,30 @@ def test_a_file_of_another_kind_is_refused(flight: Flight, tmp_path: Path) -> No
     ran = lineflight("export", "kml", flight.path, tmp_path / "a.kmz")
     assert_plain(ran, 2)
     assert ".kml" in ran.err
+
+
+def test_what_a_damaged_log_lacks_is_told_before_it_is_refused(flight: Flight, tmp_path: Path) -> None:
+    """The autopilot did tell where the flight was: the log has lost it since."""
+    small, log = tmp_path / "small.mcap", tmp_path / "damaged.mcap"
+    write_in_chunks(flight.path, small, 20_000)
+    assert damage_chunks(small, log, lambda _, topics: channels.CHANNEL_OF[Origin].topic in topics)
+    ran = lineflight("export", "kml", log, tmp_path / "a.kml")
+    assert_plain(ran, 2)
+    damage, refusal = ran.err.splitlines()
+    assert damage.startswith(f"{log}: ")
+    assert "damaged" in damage
+    assert "this log does not tell it" in refusal
+
+
+def test_a_log_that_was_cut_off_is_exported_and_the_cut_told(flight: Flight, tmp_path: Path) -> None:
+    log = tmp_path / "cut.mcap"
+    log.write_bytes(flight.path.read_bytes()[: flight.path.stat().st_size // 2])
+    ran = lineflight("export", "csv", log, tmp_path / "out")
+    assert_plain(ran, 0)
+    assert ran.err == f"{log}: The log was cut off; this is what it still holds.\n"
+
+
+def test_one_image_is_one_image(flight: Flight, tmp_path: Path) -> None:
+    ran = lineflight("export", "images", flight.path, tmp_path / "a", "--every", "1000000")
+    assert_plain(ran, 0)
+    assert ran.out.startswith(f"{tmp_path / 'a'}: 1 image, and its pose")

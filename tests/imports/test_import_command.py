@@ -13,8 +13,9 @@ from mcap.reader import make_reader
 from mission.imports.align import ClockMap
 from mission.imports.boot_clock import boot_clock
 from mission.imports.open import digest
+from mission.log.damage import CUT_OFF
 from mission.log.imported import Imported, ImportedState
-from mission.log.reader import read_flight
+from mission.log.reader import find_flaws, read_flight
 from mission.log.summary import summarise
 from mission.records import ClockSync
 from tests.imports.flown import LATENCY_S, Flown, flight_ns, fly, write_ours
@@ -42,9 +43,9 @@ def theirs(flown: Flown, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-def imported_by(ran: Ran, out: Path) -> Imported:
+def imported_by(ran: Ran, out: Path, told: str = "") -> Imported:
     assert ran.code == 0, ran.err
-    assert ran.err == ""
+    assert ran.err == told
     assert str(out) in ran.out
     imported = read_flight(out).imported
     assert imported is not None
@@ -154,7 +155,9 @@ def test_a_log_of_ours_that_was_cut_off_stays_one(ours: Path, theirs: Path, tmp_
     data = ours.read_bytes()
     cut.write_bytes(data[: int(len(data) * 0.7)])
     out = tmp_path / "cut-with-autopilot.mcap"
-    imported = imported_by(lineflight("import", cut, theirs), out)
+    told = f"{cut}: {CUT_OFF}\n"
+    imported = imported_by(lineflight("import", cut, theirs), out, told)
+    assert find_flaws(out).is_cut_off
     flight = read_flight(out)
     assert flight.is_truncated
     assert flight.states == read_flight(cut).states

@@ -22,7 +22,7 @@ from mission.log.damage import words_of_damage
 from mission.log.errors import LogError
 from mission.log.inspection import inspect_flight
 from mission.log.page.curves import flight_curves
-from mission.log.reader import Flight, find_damage, read_flight, read_images, stream_log
+from mission.log.reader import Flight, find_flaws, read_flight, read_images, stream_log
 from mission.log.task_spans import flight_start_ns
 from tests.log.synthetic_flight import fly, write_log
 from tests.support.command_line import lineflight
@@ -171,14 +171,14 @@ def test_what_is_missing_is_said_with_its_duration(log: Path, places: list[Place
     n_parts = len(places) + 1  # and an attachment
     missing_s = f"{flight.damage.missing_ns / NS_PER_S:.1f} s of the flight are missing."
     assert words == f"1 of {n_parts} parts of this log is damaged and was skipped: {missing_s}"
-    assert find_damage(path) == flight.damage
-    assert find_damage(log) is None
+    assert find_flaws(path) == flight.flaws
+    assert find_flaws(log).lines == ()
 
 
 def test_inspect_and_export_say_it(log: Path, places: list[Place], tmp_path: Path) -> None:
     path, page = tmp_path / "a.mcap", tmp_path / "a.html"
     damage_chunk(log, places[-2], path)
-    words = words_of_damage(find_damage(path))  # type: ignore[arg-type]
+    words = words_of_damage(find_flaws(path).damage)  # type: ignore[arg-type]
     told = lineflight("inspect", path, "--html", page)
     assert told.code == 0, told.err
     assert words in " ".join(told.out.split())
@@ -201,9 +201,9 @@ def test_a_copy_of_a_damaged_log_holds_what_is_sound_and_tells_what_is_not(
     damage_chunk(log, places[1], path)  # in which most channels are told
     write_copy(path, copy, [], lambda _: None)
     assert counted(copy) == counted(path) == sum((one.counts for one in places if one != places[1]), Counter())
-    assert find_damage(copy) == find_damage(path) is not None
+    assert find_flaws(copy).damage == find_flaws(path).damage is not None
     write_copy(copy, again, [], lambda _: None)
-    assert find_damage(again) == find_damage(path)
+    assert find_flaws(again).damage == find_flaws(path).damage
 
 
 def without_mission(log: Path, places: list[Place], out: Path) -> Flight:
@@ -274,7 +274,7 @@ def test_a_copy_of_a_cut_and_damaged_log_can_be_made(log: Path, places: list[Pla
         path.write_bytes(path.read_bytes()[: places[-1].end])
         write_copy(path, copy, [], lambda _: None)
         assert counted(copy) == counted(path)
-        assert find_damage(copy) == find_damage(path) is not None
+        assert find_flaws(copy).damage == find_flaws(path).damage is not None
 
 
 def test_what_another_tool_put_behind_the_log_damages_nothing(log: Path, tmp_path: Path) -> None:

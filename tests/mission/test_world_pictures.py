@@ -4,6 +4,7 @@ import csv
 import json
 import math
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 
 import cv2
@@ -17,7 +18,7 @@ from mission.log.records import LoggedMission
 from mission.records import Result as TaskResult
 from mission.records import TaskEnded, TaskStarted, TruePose
 from mission.simulated.pictures import DatasetSettings, PicturesError, make_dataset, scaled
-from mission.simulated.replay import RATE_HZ, track_of, world_of, write_video
+from mission.simulated.replay import RATE_HZ, clock, track_of, world_of, write_video
 from mission.simulated.world_pictures import app
 from sitl.render.lens import ned_from_body, pinhole
 from sitl.render.truth.files import FARTHEST_M, depth_millimetres
@@ -237,6 +238,48 @@ def test_a_flight_is_replayed_frame_by_frame(tmp_path: Path) -> None:
     assert is_drawn[25]
     assert not is_drawn[0]
     assert not is_drawn[50]
+
+
+def test_a_hole_in_the_log_is_not_flown_through(tmp_path: Path) -> None:
+    whole = flight_of(tmp_path / "a.mcap", {"world": "medium_voltage"})
+    holed = replace(whole, reports=(), truth=whole.truth[:11] + whole.truth[35:])  # from 0.5 s to 1.75 s
+    pictures, bars = [], []
+    out = tmp_path / "a.mp4"
+    assert write_video(holed, world_of(whole, None, None), out, "down", (160, 120), lambda *_: None) == 51
+    video = cv2.VideoCapture(str(out))
+    while (read := video.read())[0]:
+        pictures.append(read[1][40:116].astype(float))  # without the map
+        bars.append(read[1][122:150, :120].astype(float))  # without the clock
+    moved = [float(np.abs(after - before).mean()) for before, after in pairwise(pictures)]
+    assert max(moved[14:42]) < 0.3 * min(moved[2:11])
+    assert moved[43] > 3.0 * max(moved[14:42])
+    assert np.abs(bars[30] - bars[8]).mean() > 5.0  # other words
+    assert np.abs(bars[48] - bars[8]).mean() < 2.0
+
+
+def test_a_short_gap_of_telemetry_is_no_hole(tmp_path: Path) -> None:
+    whole = flight_of(tmp_path / "a.mcap", {})
+    track = track_of(replace(whole, truth=whole.truth[:11] + whole.truth[30:]))  # 0.95 s
+    assert all(track.is_told_at(0.04 * k) for k in range(51))
+    track = track_of(replace(whole, truth=whole.truth[:11] + whole.truth[35:]))
+    assert [track.is_told_at(t_s) for t_s in (0.0, 0.5, 0.52, 1.74, 1.75, 2.0)] == [
+        True,
+        True,
+        False,
+        False,
+        True,
+        True,
+    ]
+
+
+def test_the_clock_counts_from_the_first_task() -> None:
+    assert [clock(t_s) for t_s in (-2.54, -0.01, 0.0, 59.97, 61.0)] == [
+        "-0:02.5",
+        "0:00.0",
+        "0:00.0",
+        "1:00.0",
+        "1:01.0",
+    ]
 
 
 def _orange(patch: np.ndarray) -> bool:

@@ -3,24 +3,30 @@
 import json
 import math
 from dataclasses import replace
+from io import StringIO
 from pathlib import Path
 
 import pytest
+from rich.console import Console
 
-from mission.autopilot import VehicleState
-from mission.ending import EXIT_BAD_INPUT, EXIT_DIFFERENT, EXIT_FAILED_FILE
+from drivers.mcap_stream import Damage
+from mission.autopilot import Setpoint, VehicleState
+from mission.ending import EXIT_BAD_INPUT, EXIT_DIFFERENT
 from mission.log import channels
 from mission.log.copying import write_copy
+from mission.log.errors import LogError
 from mission.log.reader import Flight, read_flight, stream_log
 from mission.log.records import VisionEntry
 from mission.records import ControlTick
-from mission.replay.differences import Tolerance, estimate_differences, setpoint_differences
-from mission.replay.pairing import moments_of
+from mission.replay.differences import Differences, Tolerance, estimate_differences, setpoint_differences
+from mission.replay.pairing import frame_of, moments_of
 from mission.replay.replay import Replay, differences, replay, write_reference
+from mission.replay.report import print_differences
 from tests.log.synthetic_flight import fly, write_log
 from tests.replay.golden import GOLDEN
 from tests.replay.own_estimates import replay_own_estimates
 from tests.support.command_line import lineflight
+from tests.support.damaged_log import damage_chunks, write_in_chunks
 from vision.records import LineEstimate
 
 REPORTS = channels.CHANNEL_OF[VisionEntry].topic
@@ -165,7 +171,8 @@ def test_the_command_replays_and_says_so(tmp_path: Path) -> None:
     assert json.loads(ran.out)["beyond"] == []
     shown = lineflight("replay", GOLDEN)
     assert "held against the reference in the log" in shown.out
-    assert "differs by 0 degrees median" in shown.out
+    assert "the same, within the tolerance of 5 mm, 0.05 degrees and 0.25 px (p95)" in shown.out
+    assert all(line == line.rstrip() for line in shown.out.splitlines())
 
 
 def test_the_command_ends_with_6_where_the_reference_is_another(replayed: Replay, tmp_path: Path) -> None:
@@ -194,8 +201,60 @@ def test_what_cannot_be_replayed_is_refused_in_a_sentence(tmp_path: Path) -> Non
     bare = tmp_path / "bare.mcap"
     strip_reference(GOLDEN, bare)
     there = lineflight("replay", bare, "--write", bare)
-    assert there.code == EXIT_FAILED_FILE
+    assert there.code == EXIT_BAD_INPUT
     assert "exists already" in there.err
+
+
+def test_a_tick_before_a_hole_sees_nothing_of_what_comes_after_it(golden: Flight, tmp_path: Path) -> None:
+    small, holed = tmp_path / "small.mcap", tmp_path / "holed.mcap"
+    write_in_chunks(GOLDEN, small, 20_000)
+    assert damage_chunks(small, holed, lambda number, _: number > 5 and number % 3 == 0) > 5
+    flight = read_flight(holed)
+    whole = {moment.tick.t_ns: moment for moment in moments_of(golden).moments}
+    moments = moments_of(flight).moments
+    assert len(moments) < len(whole)
+    for moment in moments:
+        before = whole[moment.tick.t_ns]
+        assert moment.state in (None, before.state)
+        assert {frame_of(report) for report in moment.reports} <= {frame_of(report) for report in before.reports}
+
+
+def test_a_damaged_reference_says_what_its_verdict_is_worth(tmp_path: Path) -> None:
+    small, holed = tmp_path / "small.mcap", tmp_path / "holed.mcap"
+    write_in_chunks(GOLDEN, small, 100_000)
+    assert damage_chunks(small, holed, lambda number, _: number == 5) == 1
+    ran = lineflight("replay", holed)
+    assert "are missing" in ran.err
+    assert "The log is damaged: what came before a hole is not remembered" in ran.out
+
+
+def test_a_damaged_log_is_refused_for_what_it_lost(golden: Flight) -> None:
+    damage = Damage(1, 2, (), is_all_known=True, n_nameless=0)
+    lost = replace(golden, mission=replace(golden.mission, text=""), attachments={}, damage=damage)
+    with pytest.raises(LogError, match=r"The mission file in the log .* is damaged; it cannot be replayed"):
+        replay(lost)
+    with pytest.raises(LogError, match=r"holds no frames: there"):
+        replay(replace(golden, image_times_ns=frozenset(), damage=damage))
+    with pytest.raises(LogError, match=r"holds no frames \(vision.log_rate_hz was 0\)"):
+        replay(replace(golden, image_times_ns=frozenset()))
+
+
+def test_a_reference_that_was_written_is_named(tmp_path: Path) -> None:
+    bare, out = tmp_path / "bare.mcap", tmp_path / "ref.mcap"
+    strip_reference(GOLDEN, bare)
+    ran = lineflight("replay", bare, "--write", out)
+    assert ran.code == 0
+    assert ran.err == f"reference  {out} ({out.stat().st_size / 1e6:.1f} MB)\n"
+    assert " at most at " in ran.out
+
+
+def test_sizes_are_told_with_a_floor() -> None:
+    moved = Setpoint(0.00002, 0.0, 0.0, 0.0), Setpoint(0.0, 0.0, 0.0, 0.0)
+    text = StringIO()
+    setpoints = setpoint_differences([moved], times_s=[7.25])
+    found = Differences(False, True, estimate_differences({}, {}), setpoints)
+    print_differences(found, (), Tolerance(), Console(file=text))
+    assert "differs by under 0.1 mm median, under 0.1 mm p95, under 0.1 mm at most at 7.2 s" in text.getvalue()
 
 
 def strip_reference(log: Path, out: Path) -> None:
