@@ -284,3 +284,22 @@ def test_the_live_page_without_a_token_says_why_it_has_no_buttons(browser: Brows
         browser.evaluate("document.getElementById('checkbox').open = true")
         assert browser.evaluate("document.documentElement.scrollWidth <= innerWidth"), "it is wider than the window"
         keep(browser, f"live-no-token-{browser.evaluate('innerWidth')}")
+
+
+@pytest.mark.parametrize("address", ["127.0.0.1", "0.0.0.0"], ids=["this_computer", "any"])  # noqa: S104  # to test it
+def test_the_live_page_with_another_flights_token_has_no_buttons_from_the_start(
+    browser: Browser, address: str
+) -> None:
+    """Where reading needs no token, and where all is refused; the right address in the same tab mends it."""
+    commands = "[...document.querySelectorAll('#hold, #land')].filter((b) => b.checkVisibility()).length"
+    told = "(document.getElementById('said').textContent + document.getElementById('notice').textContent)"
+    with LiveFeed(LiveSettings(address=address, port=0, foxglove_port=0)) as feed:
+        feed.record(Briefing("follow_line", ("takeoff", "follow_lines")))
+        place, _, fragment = feed.url.partition("#")
+        page = f"http://127.0.0.1:{place.rstrip('/').rpartition(':')[2]}/"
+        browser.go(f"{page}#token=oldone")
+        browser.wait_for(f"document.getElementById('said') && {told}.includes('use the address that the flight')")
+        assert browser.evaluate(commands) == 0
+        keep(browser, f"live-old-token-{browser.evaluate('innerWidth')}-{address}")
+        browser.evaluate(f"location.hash = '{fragment}'")
+        browser.wait_for(f"document.getElementById('hold') && {commands} === 2")
