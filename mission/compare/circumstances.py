@@ -32,7 +32,7 @@ class Circumstances:
 
 def circumstances_of(flights: Sequence[Flight]) -> Circumstances:
     """What flights were flown with: their metadata, software and computers, the settings of mission and autopilot."""
-    told = [flown_with(flight) for flight in flights]
+    told = [_told_of(flight) for flight in flights]
     differing = _differing(told)
     settings = {
         f"{name} ({of_what})": values
@@ -43,6 +43,12 @@ def circumstances_of(flights: Sequence[Flight]) -> Circumstances:
         settings = {name: values for name, values in settings.items() if not name.endswith("(mission)")}
     alike = {name: told[0][name] for name in _ALIKE if name in told[0] and name not in differing}
     return Circumstances(differing | settings, alike)
+
+
+def _told_of(flight: Flight) -> dict[str, str]:
+    """What a flight was flown with; a dry-run tells of gust fronts only where it had them."""
+    told = flown_with(flight)
+    return {"gust fronts": "no"} | told if told.get("command", "").startswith("dry-run") else told
 
 
 def _differing(told: Sequence[Mapping[str, str]]) -> dict[str, tuple[str, ...]]:

@@ -49,10 +49,6 @@ class Comparison:
                     {
                         "task": (pair.first or pair.other).task,  # type: ignore[union-attr]
                         "took_s": [_took_s(pair.first), _took_s(pair.other)],
-                        "flown_with": {
-                            "differing": {name: list(values) for name, values in self.circumstances.differing.items()},
-                            "alike": self.circumstances.alike,
-                        },
                         "results": [
                             None if pair.first is None else pair.first.result,
                             None if pair.other is None else pair.other.result,

@@ -10,7 +10,7 @@ _LABELS = {
     "yaw_error_median_deg": "true heading error, median",
     "yaw_error_p95_deg": "true heading error, p95",
     "frames": "frames",
-    "estimates_share": "frames with a line",
+    "estimates_percent": "frames with a line",
     "doubtful_frames": "doubtful frames",
     "latency_p50_ms": "vision latency, median",
     "latency_p95_ms": "vision latency, p95",
@@ -22,8 +22,8 @@ _LABELS = {
     "excursions": "excursions",
 }
 _STRAIGHTNESS = re.compile(r"leg_(\d+)_straightness_(mean|p95)_m")
-_UNITS = {"_ms": ("ms", 1, 1.0), "_hz": ("Hz", 1, 1.0), "_deg": ("°", 2, 1.0), "_share": ("%", 1, 100.0)}
-_UNITS |= {"_m": ("m", 3, 1.0), "_s": ("s", 1, 1.0)}  # after those that end alike
+_UNITS = {"_ms": ("ms", 1), "_hz": ("Hz", 1), "_deg": ("°", 2), "_percent": ("%", 1)}
+_UNITS |= {"_m": ("m", 3), "_s": ("s", 1)}  # after those that end alike
 UNKNOWN = "-"
 
 
@@ -39,16 +39,13 @@ def value_words(name: str, value: float | None) -> str:
 
 
 def change_words(name: str, change: float | None) -> str:
-    """A change with its sign and unit; what is too small to be shown is no change."""
+    """A change with its sign and unit, of a percentage in points; what is too small to be shown is no change."""
     if change is None:
         return UNKNOWN
-    return (
-        "same"
-        if not any(digit in "123456789" for digit in _spelled(name, change, "+"))
-        else _spelled(name, change, "+")
-    )
+    words = _spelled(name, change, "+").replace("%", "points")
+    return words if any(digit in "123456789" for digit in words) else "same"
 
 
 def _spelled(name: str, value: float, sign: str) -> str:
-    unit, digits, factor = next((spell for end, spell in _UNITS.items() if name.endswith(end)), ("", 0, 1.0))
-    return f"{value * factor:{sign}.{digits}f}" + ("" if not unit else unit if unit == "°" else f" {unit}")
+    unit, digits = next((spell for end, spell in _UNITS.items() if name.endswith(end)), ("", 0))
+    return f"{value:{sign}.{digits}f}" + ("" if not unit else unit if unit == "°" else f" {unit}")

@@ -21,7 +21,7 @@ def figures_of(report: FlightReport) -> Figures:
         "yaw_error_median_deg": None if yaw is None else yaw.median_deg,
         "yaw_error_p95_deg": None if yaw is None else yaw.p95_deg,
         "frames": float(vision.frames),
-        "estimates_share": vision.estimates / vision.frames if vision.frames else None,
+        "estimates_percent": 100.0 * vision.estimates / vision.frames if vision.frames else None,
         "doubtful_frames": float(vision.doubtful),
         "latency_p50_ms": None if latency is None else latency.p50,
         "latency_p95_ms": None if latency is None else latency.p95,

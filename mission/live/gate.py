@@ -36,11 +36,18 @@ def refusal(method: str, path: str, headers: Message, settings: LiveSettings) ->
         return Refusal(403, "Other pages have no business here.")
     is_command = method == "POST"
     needs_token = is_command or not (path == "/" or settings.is_local)
-    if needs_token and not _has_token(headers.get("Authorization", ""), settings.token):
+    if needs_token and not has_token(headers, settings):
         return Refusal(403, "The token is missing or wrong: use the address that the flight printed.")
     if is_command and headers.get("Content-Type", "").partition(";")[0].strip().lower() != "application/json":
         return Refusal(415, "A command comes as application/json.")
     return None
+
+
+def has_token(headers: Message, settings: LiveSettings) -> bool:
+    """Whether a request comes with this flight's token, and so may command."""
+    authorization = headers.get("Authorization", "")
+    # In constant time, so that nobody can find it out letter by letter.
+    return hmac.compare_digest(authorization.encode("utf-8", "replace"), f"Bearer {settings.token}".encode())
 
 
 def _is_our_name(host: str, settings: LiveSettings) -> bool:
@@ -57,8 +64,3 @@ def _is_our_name(host: str, settings: LiveSettings) -> bool:
     except ValueError:
         return False
     return True
-
-
-def _has_token(authorization: str, token: str) -> bool:
-    # In constant time, so that nobody can find it out letter by letter.
-    return hmac.compare_digest(authorization.encode("utf-8", "replace"), f"Bearer {token}".encode())

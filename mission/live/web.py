@@ -14,7 +14,7 @@ from importlib import resources
 from typing import Any
 
 from mission.live.board import Board
-from mission.live.gate import Refusal, refusal
+from mission.live.gate import Refusal, has_token, refusal
 from mission.live.settings import LiveSettings
 from mission.operator import Wish
 
@@ -106,8 +106,9 @@ class _Handler(BaseHTTPRequestHandler):
             self._answer(200, "text/html; charset=utf-8", self.server.page)
         elif path == "/state":
             with self.server.lock:
-                state = _json(board.state(time.monotonic()))
-            self._answer(200, "application/json", state)
+                state = board.state(time.monotonic())
+            # The page asks with the token that it has, which may be an older flight's.
+            self._answer_json(200, state | {"may_command": has_token(self.headers, self.server.settings)})
         elif path == "/map":
             with self.server.lock:
                 drawn = _json(board.map())

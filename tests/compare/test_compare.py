@@ -1,5 +1,6 @@
 """Flights held against each other: figures, tasks side by side, and conditions for a build server."""
 
+import io
 import json
 from dataclasses import replace
 from pathlib import Path
@@ -7,6 +8,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from rich.console import Console
 
 from mission.autopilot import VehicleState
 from mission.compare.circumstances import circumstances_of
@@ -14,6 +16,7 @@ from mission.compare.comparison import compare_reports, distinct_names
 from mission.compare.conditions import ConditionError, parse_condition
 from mission.compare.figure_words import change_words, label_of, value_words
 from mission.compare.figures import figures_of, pair_tasks
+from mission.compare.report import print_comparison
 from mission.ending import EXIT_BAD_INPUT, EXIT_DIFFERENT, EXIT_FAILED_FILE
 from mission.log.flight_report import TaskSummary
 from mission.log.inspection import inspect_flight
@@ -67,6 +70,8 @@ def test_what_flights_were_flown_with_is_told_where_it_differs(logs: tuple[Path,
         parameters={"MPC_XY_P": 0.8, "MPC_Z_P": 1.0},
         plan={"tasks": [{"altitude_m": 7.5}]},
     )
+    gusty = with_circumstances(flight, first.mission.metadata | {"gust_fronts": "yes"})
+    assert circumstances_of([first, gusty]).differing["gust fronts"] == ("no", "yes")
     found = circumstances_of([first, other])
     assert found.differing == {
         "world": ("corner", "hills"),
@@ -105,7 +110,8 @@ def test_people_read_the_first_of_many_settings_and_programs_all(logs: tuple[Pat
         ("setpoint_gap_max_ms", -1e-11, "-0.0 ms", "same"),
         ("setpoint_rate_hz", 20.0, "20.0 Hz", "+20.0 Hz"),
         ("yaw_error_p95_deg", -2.5, "-2.50°", "-2.50°"),
-        ("estimates_share", 0.5, "50.0 %", "+50.0 %"),
+        ("estimates_percent", 50.0, "50.0 %", "+50.0 points"),
+        ("estimates_percent", -0.01, "-0.0 %", "same"),
         ("duration_s", None, "-", "-"),
     ],
 )
@@ -222,7 +228,9 @@ def test_the_command_compares_and_fails_where_it_is_told_to(logs: tuple[Path, Pa
     answer = json.loads(fine.out)
     assert answer["failures"] == []
     assert answer["figures"]["duration_s"][0] == answer["figures"]["duration_s"][1]
+    assert set(answer["tasks"][0][0]) == {"task", "took_s", "results"}
     assert answer["tasks"][0][0]["task"] == "takeoff"
+    assert answer["figures"]["estimates_percent"][0] > 1.0
     assert answer["flown_with"]["differing"] == {}
     assert answer["flown_with"]["alike"]["mission"] == "follow_line"
 
@@ -245,3 +253,33 @@ def test_a_task_that_only_one_has_flown_is_told(logs: tuple[Path, Path], tmp_pat
     write_log(lacking, kept)
     ran = lineflight("compare", logs[0], lacking)
     assert "align: flown in 1, not in 2" in ran.out
+
+
+@pytest.mark.parametrize("width", [60, 80, 100])
+@pytest.mark.parametrize("n_logs", [2, 3, 4, 7])
+def test_in_a_terminal_no_number_is_cut_or_wrapped(logs: tuple[Path, Path], n_logs: int, width: int) -> None:
+    flights = [read_flight(log) for log in logs]
+    flights = [flights[k % 2] for k in range(n_logs)]
+    comparison = compare_reports(
+        [f"f{k}" for k in range(n_logs)], [inspect_flight(f) for f in flights], circumstances_of(flights)
+    )
+    shown = io.StringIO()
+    print_comparison(comparison, Console(file=shown, width=width, force_terminal=True, color_system=None))
+    text = shown.getvalue()
+    assert "…" not in text
+    assert max(map(len, text.splitlines())) <= width
+    for name in comparison.figure_names:
+        spelled = [value_words(name, figures.get(name)) for figures in comparison.figures]
+        spelled += [change_words(name, comparison.change(name, k)) for k in range(1, n_logs)]
+        rows = [line.removeprefix(f" {name} ") for line in text.splitlines() if line.startswith(f"  {name} ")]
+        rows = [row.removeprefix(f"  {name}").replace(f" {label_of(name)} ", " ") for row in rows]
+        assert " ".join(" ".join(rows).split()) == " ".join(spelled), name
+
+
+def test_a_title_is_not_wrapped_at_its_tables_width(logs: tuple[Path, Path]) -> None:
+    flight = read_flight(logs[0])
+    flights = [with_circumstances(flight, {"seed": seed}) for seed in "12"]
+    comparison = compare_reports(["a", "b"], [inspect_flight(f) for f in flights], circumstances_of(flights))
+    shown = io.StringIO()
+    print_comparison(comparison, Console(file=shown))
+    assert "What they were flown with differs" in shown.getvalue().splitlines()

@@ -75,6 +75,12 @@ def test_state_map_and_frame_are_read_without_a_token(served: Served) -> None:
     assert ask(served.port, "/../secrets").status == 404
 
 
+def test_the_state_says_whether_a_page_has_this_flights_token(served: Served) -> None:
+    assert ask(served.port, "/state").json["may_command"] is False
+    assert ask(served.port, "/state", Authorization="Bearer oldone").json["may_command"] is False
+    assert ask(served.port, "/state", Authorization=f"Bearer {served.token}").json["may_command"] is True
+
+
 def test_hold_and_land_are_passed_on(served: Served) -> None:
     assert command(served.port, "/hold", served.token).status == 202
     assert command(served.port, "/land", served.token, Origin=f"http://127.0.0.1:{served.port}").status == 202

@@ -1,6 +1,7 @@
 """Chromium without a window, driven over a pipe by its DevTools protocol (https://chromedevtools.github.io)."""
 
 import base64
+import contextlib
 import fcntl
 import json
 import os
@@ -31,6 +32,10 @@ _FLAGS = (
 def find_chromium() -> str | None:
     """The browser's program; None where there is none."""
     return next((path for name in PROGRAMS if (path := shutil.which(name)) is not None), None)
+
+
+class _Navigated(RuntimeError):
+    """The page went while it was asked."""
 
 
 @dataclass
@@ -120,10 +125,13 @@ class Browser:
         self.send("Page.navigate", url=url)
 
     def wait_for(self, expression: str) -> None:
-        """Wait until an expression is true."""
+        """Wait until an expression is true, on this page or on the one that it goes to."""
         limit_s = time.monotonic() + _ANSWER_LIMIT_S
-        while not self.evaluate(expression):
-            if time.monotonic() > limit_s:
+        is_true = False
+        while not is_true:
+            with contextlib.suppress(_Navigated):
+                is_true = bool(self.evaluate(expression))
+            if not is_true and time.monotonic() > limit_s:
                 raise TimeoutError(f"{expression} did not come true; errors: {self.page.errors}")
 
     def evaluate(self, expression: str) -> Any:
@@ -149,6 +157,8 @@ class Browser:
             heard = self._hear(limit_s)
             if heard.get("id") == self._n_sent:
                 if "error" in heard:
+                    if "navigated" in heard["error"]["message"]:
+                        raise _Navigated(method)
                     raise RuntimeError(f"{method}: {heard['error']}")
                 result: dict[str, Any] = heard["result"]
                 return result

@@ -230,11 +230,37 @@ def test_a_comparison_says_first_what_differs(browser: Browser, flight: Flight, 
     rows = browser.evaluate(
         "[...document.querySelectorAll('#flights tr')].slice(1).map((r) => [...r.cells].map((c) => c.textContent))"
     )
+    assert not browser.evaluate("document.getElementById('mapnote').hidden") or flight.line is None
     assert rows == [["world", "medium_voltage", "hills"], ["wind", "8 m/s", "3 m/s"]]
     assert browser.evaluate(
         "document.getElementById('flights').getBoundingClientRect().bottom"
         " < document.getElementById('figures').getBoundingClientRect().top"
     )
+
+
+@pytest.mark.parametrize("n_flights", [4, 7])
+def test_many_flights_beside_each_other_stay_readable(
+    browser: Browser, flight: Flight, tmp_path: Path, n_flights: int
+) -> None:
+    told = flight.mission.metadata
+    flights = [
+        replace(flight, mission=replace(flight.mission, metadata=told | {"wind_m_s": str(k)})) for k in range(n_flights)
+    ]
+    page = tmp_path / "compared.html"
+    names = [f"flight_{k}" for k in range(n_flights)]
+    comparison = compare_reports(names, [inspect_flight(one) for one in flights], circumstances_of(flights))
+    page.write_text(comparison_page(comparison, flights))
+    browser.open(page)
+    keep(browser, f"compared-{n_flights}-{browser.evaluate('innerWidth')}")
+    assert browser.evaluate("document.documentElement.scrollWidth <= innerWidth"), "it is wider than the window"
+    assert browser.evaluate("document.getElementById('map').clientHeight < 700")
+    assert browser.evaluate("Math.max(...[...document.querySelectorAll('#figures tr')].map((r) => r.clientHeight)) < 90")
+    colours = "new Set([...document.querySelectorAll('.flights .swatch')].map((s) => s.style.background)).size"
+    assert browser.evaluate(colours) == n_flights
+    last = "[...document.querySelectorAll('#figures tr')].at(-1).cells"
+    browser.evaluate("document.querySelector('#figures .scroll').scrollLeft = 1e5")
+    assert browser.evaluate(f"[...{last}].at(-1).getBoundingClientRect().right <= innerWidth"), "it is cut"
+    assert browser.evaluate(f"{last}[0].getBoundingClientRect().left >= 0"), "the figure's name is gone"
 
 
 def test_it_is_dark_where_people_want_it_dark(page: Path) -> None:
@@ -284,3 +310,20 @@ def test_the_live_page_without_a_token_says_why_it_has_no_buttons(browser: Brows
         browser.evaluate("document.getElementById('checkbox').open = true")
         assert browser.evaluate("document.documentElement.scrollWidth <= innerWidth"), "it is wider than the window"
         keep(browser, f"live-no-token-{browser.evaluate('innerWidth')}")
+
+
+@pytest.mark.parametrize("address", ["127.0.0.1", "0.0.0.0"], ids=["this_computer", "any"])  # noqa: S104  # to test it
+def test_the_live_page_with_another_flights_token_has_no_buttons_from_the_start(browser: Browser, address: str) -> None:
+    """Where reading needs no token, and where all is refused; the right address in the same tab mends it."""
+    commands = "[...document.querySelectorAll('#hold, #land')].filter((b) => b.checkVisibility()).length"
+    told = "(document.getElementById('said').textContent + document.getElementById('notice').textContent)"
+    with LiveFeed(LiveSettings(address=address, port=0, foxglove_port=0)) as feed:
+        feed.record(Briefing("follow_line", ("takeoff", "follow_lines")))
+        place, _, fragment = feed.url.partition("#")
+        page = f"http://127.0.0.1:{place.rstrip('/').rpartition(':')[2]}/"
+        browser.go(f"{page}#token=oldone")
+        browser.wait_for(f"document.getElementById('said') && {told}.includes('use the address that the flight')")
+        assert browser.evaluate(commands) == 0
+        keep(browser, f"live-old-token-{browser.evaluate('innerWidth')}-{address}")
+        browser.evaluate(f"location.hash = '{fragment}'")
+        browser.wait_for(f"document.getElementById('hold') && {commands} === 2")

@@ -5,8 +5,8 @@
   const style = getComputedStyle(document.documentElement);
   const color = (name) => style.getPropertyValue("--" + name).trim();
   const words = (name) => name.replaceAll("_", " ");
-  const PAINTS = ["ink", "accent", "executive", "autopilot", "wind", "perception"].map(color);
-  const paint = (k) => PAINTS[k % PAINTS.length];
+  const PAINTS = [...["ink", "accent", "executive", "autopilot", "wind", "perception"].map(color), "#84a80d", "#b9770e", "#d13fe0", "#22a7c9"];
+  const paint = (k) => PAINTS[k] ?? `hsl(${Math.round(k * 137.5) % 360} 60% 50%)`; // each flight has its own, however many there are
   const took = (v) => (v === null ? "–" : `${v.toFixed(1)} s`);
   const TONES = { completed: "ok", failed: "failed", unfinished: "failed" };
 
@@ -37,7 +37,9 @@
       row.forEach((cell, k) => line.append(make("td", cell, k >= numbers ? "num" : "")));
       body.append(line);
     }
-    place.append(body);
+    const box = make("div", undefined, "scroll");
+    box.append(body);
+    place.append(box);
   }
 
   const number = (k) => [swatch(k), String(k + 1)];
@@ -67,6 +69,7 @@
 
   flights();
   const changes = data.names.slice(1).map((_, k) => (data.names.length === 2 ? "change" : `change ${k + 2}`));
+  if (data.names.length > 3) document.querySelector("main").classList.add("many");
   $("figures").append(make("h2", "Figures"));
   table($("figures"), ["", ...numbered(), ...changes], data.figure_rows);
   data.tasks.forEach((pairs, other) => {
@@ -74,6 +77,11 @@
     table($("tasktable"), ["", number(0), number(other + 1), "1 took", `${other + 2} took`],
       pairs.map((task) => [words(task.task), ...task.results.map((r) => (r === null ? "not flown" : words(r))), ...task.took_s.map(took)]), 3);
   });
+  if (data.lines.length > 1) {
+    const told = data.lines.map(({ flights: these }, k) => `${these.map((one) => one + 1).join(", ")} along ${k ? "another" : "one"}`);
+    $("mapnote").textContent = `They flew along different lines (${told.join("; ")}): each is drawn from its own flight's origin, and where they cross here says nothing.`;
+    $("mapnote").hidden = false;
+  }
   const legend = (name, style) => {
     const entry = make("span"), mark = make("i");
     mark.style.cssText = style;
