@@ -221,7 +221,10 @@ def test_the_comparison_page_is_whole(browser: Browser, log: Path, tmp_path: Pat
 
 def test_a_comparison_says_first_what_differs(browser: Browser, flight: Flight, tmp_path: Path) -> None:
     told = flight.mission.metadata
-    other = replace(flight, mission=replace(flight.mission, metadata=told | {"wind_m_s": "3", "world": "hills"}))
+    assert flight.line is not None
+    line = replace(flight.line, axis_ne_m=tuple((north_m + 9.0, east_m) for north_m, east_m in flight.line.axis_ne_m))
+    metadata = told | {"wind_m_s": "3", "world": "hills"}
+    other = replace(flight, mission=replace(flight.mission, metadata=metadata), line=line)
     reports = [inspect_flight(one) for one in (flight, other)]
     page = tmp_path / "compared.html"
     comparison = compare_reports(["a", "b"], reports, circumstances_of([flight, other]))
@@ -230,7 +233,8 @@ def test_a_comparison_says_first_what_differs(browser: Browser, flight: Flight, 
     rows = browser.evaluate(
         "[...document.querySelectorAll('#flights tr')].slice(1).map((r) => [...r.cells].map((c) => c.textContent))"
     )
-    assert not browser.evaluate("document.getElementById('mapnote').hidden") or flight.line is None
+    assert "(1 along one; 2 along another)" in browser.evaluate("document.getElementById('mapnote').textContent")
+    assert not browser.evaluate("document.getElementById('mapnote').hidden")
     assert rows == [["world", "medium_voltage", "hills"], ["wind", "8 m/s", "3 m/s"]]
     assert browser.evaluate(
         "document.getElementById('flights').getBoundingClientRect().bottom"
@@ -254,7 +258,8 @@ def test_many_flights_beside_each_other_stay_readable(
     keep(browser, f"compared-{n_flights}-{browser.evaluate('innerWidth')}")
     assert browser.evaluate("document.documentElement.scrollWidth <= innerWidth"), "it is wider than the window"
     assert browser.evaluate("document.getElementById('map').clientHeight < 700")
-    assert browser.evaluate("Math.max(...[...document.querySelectorAll('#figures tr')].map((r) => r.clientHeight)) < 90")
+    heights = "[...document.querySelectorAll('#figures tr')].map((row) => row.clientHeight)"
+    assert browser.evaluate(f"Math.max(...{heights}) < 90")
     colours = "new Set([...document.querySelectorAll('.flights .swatch')].map((s) => s.style.background)).size"
     assert browser.evaluate(colours) == n_flights
     last = "[...document.querySelectorAll('#figures tr')].at(-1).cells"
