@@ -111,7 +111,6 @@ def test_a_camera_that_cannot_be_is_refused_with_its_line(tmp_path: Path, camera
         (("calibrate", "missions", "--board", "2x4"), "--board is '2x4'"),
         (("calibrate", "none"), "no folder none"),
         (("calibrate", "missions"), "holds no photographs"),
-        (("calibrate", "docs/images"), "found in no photograph"),
         (("calibrate", "missions", "--board", "9by6"), "--board is '9by6'"),
     ],
 )
@@ -119,3 +118,11 @@ def test_bad_input_is_one_sentence_and_exit_2(arguments: tuple[str, ...], words:
     ran = lineflight("camera", *arguments)
     assert_plain(ran, 2)
     assert words in ran.err
+
+
+def test_photographs_without_a_board_are_one_sentence(tmp_path: Path) -> None:
+    for name in ("a.png", "b.png"):
+        assert cv2.imwrite(str(tmp_path / name), np.full((240, 320, 3), 120, np.uint8))
+    ran = lineflight("camera", "calibrate", tmp_path)
+    assert_plain(ran, 2)
+    assert "found in no photograph" in ran.err
