@@ -14,8 +14,6 @@ _BY_TIME = (
     "The log was sorted by time since it was flown: which estimate a control tick used is told by latencies, which may "
     "err by a tick. Replay the log as it was recorded."
 )
-
-
 _DAMAGED = "The log is damaged: what came before a hole is not remembered, so that differences after it tell nothing."
 
 
